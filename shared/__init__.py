@@ -1,0 +1,1 @@
+"""The library of Riposte: functions and values, imported by the processes in ``services``."""

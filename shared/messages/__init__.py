@@ -1,0 +1,1 @@
+"""Everything that crosses the bus: messages, their wire format and the topic table."""

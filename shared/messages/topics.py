@@ -1,0 +1,128 @@
+"""The one topic table: every key on the bus, what it carries and how."""
+
+import dataclasses
+import enum
+from typing import Any, Generic, TypeVar
+
+from shared.messages.league import (
+    BoutResults,
+    Incident,
+    Lease,
+    LeaseRenewal,
+    LeaseRequest,
+    LeaseStatus,
+    Schedule,
+    SnapshotReply,
+    SnapshotRequest,
+)
+from shared.messages.live import BoutFrames, Progress, ServiceStatus
+from shared.messages.message import Message
+from shared.messages.training import (
+    PolicyAnnouncement,
+    Receipt,
+    Rollout,
+    VersionReceipt,
+    VersionReport,
+)
+
+M = TypeVar("M", bound=Message)
+R = TypeVar("R", bound=Message)
+
+
+class Qos(enum.Enum):
+    """How a topic travels."""
+
+    LATEST = "latest"
+    """Newest value wins; the owner re-sends it every second, so late joiners and healed links get it."""
+    STREAM = "stream"
+    """Every value once, dropped where a reader is slow; for viewers."""
+    REQUEST = "request"
+    """Asked and answered; the asker decides what to do without an answer."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Topic(Generic[M]):
+    """A published value: one writer, any number of readers."""
+
+    key: str
+    """Key expression with ``{fields}``."""
+    message: type[M]
+    qos: Qos
+    max_bytes: int
+    """Payloads over this are refused unread."""
+    writer: str
+    readers: str
+    about: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Service(Generic[M, R]):
+    """A request and its answer; ``acked`` ones are repeated until answered and applied once."""
+
+    key: str
+    request: type[M]
+    reply: type[R]
+    max_bytes: int
+    max_reply_bytes: int
+    asker: str
+    answerer: str
+    about: str
+    acked: bool = False
+    qos: Qos = Qos.REQUEST
+
+
+KIB = 1024
+MIB = 1024 * KIB
+
+ROLLOUT = Service(
+    "learner/{agent}/rollout", Rollout, Receipt, 8 * MIB, 4 * KIB, "actor", "learner",
+    "T x N steps; acknowledged when a checkpoint holds the update made from them", acked=True,
+)
+RESULTS = Service(
+    "league/results", BoutResults, Receipt, 1 * MIB, 4 * KIB, "actor", "league",
+    "finished bouts; acknowledged when they are in the ledger", acked=True,
+)
+VERSION = Service(
+    "league/version", VersionReport, VersionReceipt, 8 * MIB, 4 * KIB, "learner", "league",
+    "a new policy version; acknowledged when ledger and snapshot store hold it", acked=True,
+)
+INCIDENT = Service(
+    "league/incident", Incident, Receipt, 16 * KIB, 4 * KIB, "any", "league",
+    "what the report should mention", acked=True,
+)
+LEASE = Service(
+    "league/lease", LeaseRequest, Lease, 4 * KIB, 16 * KIB, "actor", "league", "asks for work"
+)
+RENEWAL = Service(
+    "league/renewal", LeaseRenewal, LeaseStatus, 4 * KIB, 4 * KIB, "actor", "league",
+    "keeps a lease alive",
+)
+SNAPSHOT = Service(
+    "league/snapshot", SnapshotRequest, SnapshotReply, 4 * KIB, 8 * MIB, "actor", "league",
+    "fetches an immutable policy by its hash",
+)
+POLICY = Topic(
+    "learner/{agent}/policy", PolicyAnnouncement, Qos.LATEST, 8 * MIB, "learner", "actor",
+    "the version to act with",
+)
+SCHEDULE = Topic(
+    "league/schedule", Schedule, Qos.LATEST, 1 * MIB, "league", "learner, recorder",
+    "stage, leases and versions",
+)
+PROGRESS = Topic(
+    "league/progress", Progress, Qos.LATEST, 64 * KIB, "league", "train, status, recorder",
+    "where the run stands",
+)
+STATUS = Topic(
+    "status/{role}/{name}", ServiceStatus, Qos.LATEST, 64 * KIB, "every service",
+    "status, train, recorder", "health, rates, and whom a service waits for",
+)
+FRAMES = Topic(
+    "actor/{name}/frames", BoutFrames, Qos.STREAM, 8 * MIB, "actor", "recorder",
+    "a sampled bout to look at",
+)
+
+SERVICES: tuple[Service[Any, Any], ...] = (
+    ROLLOUT, RESULTS, VERSION, INCIDENT, LEASE, RENEWAL, SNAPSHOT,
+)
+TOPICS: tuple[Topic[Any], ...] = (POLICY, SCHEDULE, PROGRESS, STATUS, FRAMES)
