@@ -1,0 +1,130 @@
+"""Files that are whole or not there, and a folder that belongs to one process."""
+
+import contextlib
+import errno
+import fcntl
+import os
+import shutil
+from pathlib import Path
+from types import TracebackType
+
+from shared.errors import RiposteError
+
+OUT_OF_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+MIB = 1 << 20
+
+
+def atomic_write(path: str | os.PathLike[str], data: bytes | bytearray | memoryview) -> None:
+    """Write ``data`` to ``path`` so that a reader, or a crash, sees the old file or the new one.
+
+    The bytes go to a temporary file in the same folder, are synced, renamed over ``path``, and
+    the folder is synced.
+
+    Raises:
+        RiposteError: there is no space, or the folder cannot be written; the old file is intact.
+    """
+    target = Path(path)
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    try:
+        with temporary.open("wb", buffering=0) as file:
+            _write_all(file.fileno(), memoryview(data))
+            os.fsync(file.fileno())
+        os.replace(temporary, target)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+        raise _explain(error, target, len(data)) from error
+    sync_folder(target.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make the names in ``folder`` durable."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def require_free_space(folder: str | os.PathLike[str], needed_bytes: int) -> None:
+    """Check that the disk of ``folder`` has room.
+
+    Raises:
+        RiposteError: there is less than ``needed_bytes`` free.
+    """
+    free = shutil.disk_usage(_existing(Path(folder))).free
+    if free < needed_bytes:
+        raise RiposteError(
+            f"no space left: {os.fspath(folder)} has {free / MIB:.0f} MiB free, "
+            f"{needed_bytes / MIB:.0f} MiB are needed; free some or choose another folder"
+        )
+
+
+class RunLock:
+    """The right of one process to write into a folder; released by ``close`` or by any death."""
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        """Take the lock.
+
+        Raises:
+            RiposteError: another process has it (its id is named), or the folder is not writable.
+        """
+        self.path = Path(folder) / "lock"
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        except OSError as error:
+            raise _explain(error, self.path, 0) from error
+        self._descriptor: int | None = descriptor
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            holder = os.pread(descriptor, 64, 0).decode("ascii", "replace").strip() or "unknown"
+            self.close()
+            raise RiposteError(
+                f"{self.path.parent} is in use by process {holder}: "
+                "wait for it, stop it, or choose another folder with --out"
+            ) from error
+        os.ftruncate(descriptor, 0)
+        os.pwrite(descriptor, f"{os.getpid()}\n".encode("ascii"), 0)
+
+    def close(self) -> None:
+        """Release it; a second call does nothing. The file stays, it is only a place to lock."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
+
+    def __enter__(self) -> "RunLock":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def _write_all(descriptor: int, data: memoryview) -> None:
+    view = data.cast("B")
+    while view.nbytes:
+        view = view[os.write(descriptor, view) :]
+
+
+def _existing(path: Path) -> Path:
+    while not path.exists():
+        path = path.parent
+    return path
+
+
+def _explain(error: OSError, target: Path, size: int) -> RiposteError:
+    if error.errno in OUT_OF_SPACE:
+        before = (
+            f"the {target.name} from before is intact" if target.exists() else "nothing is lost"
+        )
+        return RiposteError(
+            f"no space left to write {target} ({size / MIB:.1f} MiB): {before}; "
+            "free some space and start again"
+        )
+    return RiposteError(f"cannot write {target}: {error.strerror or error}")

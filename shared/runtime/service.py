@@ -1,0 +1,117 @@
+"""A service as its process sees it: something that ticks."""
+
+import dataclasses
+import os
+import socket
+import threading
+from importlib import metadata
+from typing import Protocol
+
+from shared.bus.base import Bus
+from shared.clock import Clock
+from shared.messages.live import ServiceStatus
+from shared.messages.topics import STATUS
+from shared.runtime.process import Usage, usage
+
+IDLE_SECONDS = 0.05
+"""How long a service with nothing to do waits for the bus."""
+STATUS_PERIOD = 1.0
+"""Seconds from one ServiceStatus to the next."""
+
+
+@dataclasses.dataclass
+class Health:
+    """How a service is, in its own words."""
+
+    state: str = "starting"
+    """What it does now, in a few words."""
+    waiting_for: str = ""
+    """Whom or what it waits for; empty when it does not."""
+    waiting_seconds: float = 0.0
+    rates: dict[str, float] = dataclasses.field(default_factory=dict[str, float])
+    """Per second, by name with unit: ``samples_per_s``."""
+    counters: dict[str, int] = dataclasses.field(default_factory=dict[str, int])
+    """Since the process started."""
+    last_error: str = ""
+
+
+class Ticking(Protocol):
+    """A service: does what can be done now, says how it is, and ends when told."""
+
+    def tick(self) -> bool:
+        """Do everything possible now without blocking; return whether anything was done."""
+        ...
+
+    def health(self) -> Health:
+        """Return how it is; called once a second, so it must be cheap."""
+        ...
+
+    def close(self) -> None:
+        """Finish what must not be lost and let go of everything; called once."""
+        ...
+
+
+def version() -> str:
+    """Return the installed version of Riposte, ``unknown`` in a bare source tree."""
+    try:
+        return metadata.version("riposte")
+    except metadata.PackageNotFoundError:
+        return "unknown"
+
+
+def run(service: Ticking, bus: Bus, clock: Clock, role: str, stop: threading.Event) -> None:
+    """Tick ``service`` until ``stop`` is set, and publish its status every second.
+
+    The caller closes the service and the bus.
+
+    Raises:
+        BusError: the bus was lost for longer than its limit.
+    """
+    bus.declare_alive(role)
+    reporter = StatusReporter(service, bus, clock, role)
+    while not stop.is_set():
+        did = service.tick()
+        reporter.tick()
+        bus.wait(0.0 if did else IDLE_SECONDS)
+
+
+class StatusReporter:
+    """Publishes the ServiceStatus of one service every second."""
+
+    def __init__(self, service: Ticking, bus: Bus, clock: Clock, role: str) -> None:
+        self._service = service
+        self._bus = bus
+        self._clock = clock
+        self._role = role
+        self._host = socket.gethostname()
+        self._version = version()
+        self._due_at = clock.now()
+
+    def tick(self) -> None:
+        """Publish if a second has passed since the last time."""
+        now = self._clock.now()
+        if now < self._due_at:
+            return
+        self._due_at = now + STATUS_PERIOD
+        self._bus.publish(STATUS, self.status(usage()), role=self._role, name=self._bus.name)
+
+    def status(self, used: Usage) -> ServiceStatus:
+        """Return the status to publish: the service's health, the bus counters, the process."""
+        health = self._service.health()
+        counters = {f"bus_{name}": count for name, count in self._bus.counters.items()}
+        return ServiceStatus(
+            role=self._role,
+            name=self._bus.name,
+            boot=self._bus.boot,
+            pid=os.getpid(),
+            host=self._host,
+            state=health.state,
+            waiting_for=health.waiting_for,
+            waiting_seconds=health.waiting_seconds,
+            rates=dict(health.rates),
+            counters=counters | health.counters,
+            cpu_seconds=used.cpu_seconds,
+            rss_bytes=used.rss_bytes,
+            last_error=health.last_error,
+            version=self._version,
+        )
