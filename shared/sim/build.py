@@ -1,0 +1,225 @@
+"""Builds the scene: two PR2 robots on their bases, one arm and one bat each.
+
+Only what moves or touches is in the physics model; looks are added by ``visuals.py`` where
+somebody looks, so that a training batch never pays for them.
+"""
+
+# pyright: basic
+# (mujoco's bindings carry no types)
+
+import math
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from shared.sim.arm import Arm, Float64, Inertial, combine, load_arm, load_stance
+from shared.sim.config import SimConfig
+from shared.sim.parameters import BatParameters, ModelParameters
+
+AGENTS: Final = ("antagonist", "protagonist")
+"""Index 0 and 1 wherever agents are in an array."""
+BASE_YAW: Final = (math.pi, 0.0)
+"""The antagonist stands at +x and looks along -x (rad)."""
+CONTROLS: Final = 7
+"""Per agent: desired tool position and quaternion (w, x, y, z) in its torso frame."""
+SENSORS: Final = 20
+"""Per agent: bat position, quaternion, velocities in the world; tool pose in the torso frame."""
+ARENA_BYTES: Final = 200_000
+"""Scratch memory of one world: enough for every contact there can be, small enough for caches."""
+
+_TYPE = mujoco.mjtGeom
+_AXES: Final = "xyz"
+_STRUCK: Final = {"upper_arm_roll": 0.32, "forearm_roll": 0.26, "wrist_roll": 0.16}
+"""Links of an arm that the other's bat can reach, and how long they are (m)."""
+_STRUCK_RADIUS: Final = 0.06
+
+
+def base_position(cfg: SimConfig) -> Float64:
+    """Return float64[2, 3]: each agent's torso frame in the world (m)."""
+    height = load_stance().torso_height + cfg.torso_lift
+    return np.array([[cfg.half_distance, 0.0, height], [-cfg.half_distance, 0.0, height]])
+
+
+def build_spec(
+    cfg: SimConfig, parameters: ModelParameters, agents: tuple[str, ...] = AGENTS
+) -> mujoco.MjSpec:
+    """Return the physics of the scene, uncompiled.
+
+    Args:
+        cfg: the scene and its time steps.
+        parameters: the simulator's parameters.
+        agents: who stands in the scene, in the order of sensors and controls.
+    """
+    spec = mujoco.MjSpec()
+    spec.modelname = f"riposte {parameters.name}"
+    spec.compiler.degree = False
+    spec.memory = ARENA_BYTES
+    _set_options(spec, cfg)
+    for agent in agents:
+        _add_robot(spec, cfg, parameters, agent)
+    for agent in agents:
+        _add_servo(spec, parameters, agent)
+        _add_sensors(spec, agent)
+    if len(agents) == 2:
+        _add_contacts(spec, cfg)
+    return spec
+
+
+def _set_options(spec: mujoco.MjSpec, cfg: SimConfig) -> None:
+    option = spec.option
+    option.timestep = cfg.physics_timestep
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
+    # Never sparse: 4.0.0 factorizes wrongly there, and dense is faster at 14 velocities.
+    option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    # The arms are counterbalanced by springs and nothing moves freely, so there is no gravity.
+    # A diverged world must stay as it is, to be found and dumped.
+    off = mujoco.mjtDisableBit
+    option.disableflags |= int(off.mjDSBL_GRAVITY) | int(off.mjDSBL_AUTORESET)
+
+
+def _add_robot(
+    spec: mujoco.MjSpec, cfg: SimConfig, parameters: ModelParameters, agent: str
+) -> None:
+    index = AGENTS.index(agent)
+    arm = load_arm(cfg.arms[index])
+    yaw = BASE_YAW[index]
+    body = spec.worldbody.add_body(
+        name=f"{agent}/torso",
+        pos=base_position(cfg)[index],
+        quat=[math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)],
+    )
+    body.add_site(name=f"{agent}/torso")
+    for joint in arm.joints:
+        body = body.add_body(name=f"{agent}/{joint.name}", pos=joint.origin)
+        values = parameters.joints[joint.name]
+        hinge = body.add_joint(
+            name=f"{agent}/{joint.name}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=joint.axis
+        )
+        hinge.damping[:] = values.damping
+        hinge.frictionloss = values.friction_loss
+        hinge.armature = values.armature
+        hinge.actfrcrange = [-values.torque_limit, values.torque_limit]
+        if joint.range is not None:
+            hinge.range = joint.range
+        for extension in parameters.extensions:
+            if extension.joint == joint.name:
+                hinge.stiffness[0] = extension.stiffness
+                hinge.springref = extension.angle
+        inertial = joint.inertial
+        if joint.name == "wrist_roll":
+            inertial = combine([inertial, bat_inertial(parameters.bat, arm)])
+        _set_inertial(body, inertial)
+        if cfg.bat_arm_contacts and joint.name in _STRUCK:
+            body.add_geom(
+                name=f"{agent}/{joint.name}",
+                type=_TYPE.mjGEOM_CAPSULE,
+                fromto=[0.0, 0.0, 0.0, _STRUCK[joint.name], 0.0, 0.0],
+                size=[_STRUCK_RADIUS, 0.0, 0.0],
+                contype=0,
+                conaffinity=0,
+            )
+    body.add_site(name=f"{agent}/tool", pos=arm.tool)
+    _add_bat(body, parameters.bat, arm, agent)
+
+
+def _set_inertial(body: mujoco.MjsBody, inertial: Inertial) -> None:
+    full = inertial.inertia
+    body.explicitinertial = True
+    body.mass = inertial.mass
+    body.ipos = inertial.com
+    body.fullinertia = [full[0, 0], full[1, 1], full[2, 2], full[0, 1], full[0, 2], full[1, 2]]
+
+
+def bat_quaternion(bat: BatParameters) -> Float64:
+    """Return float64[4]: the bat's frame (+x along the blade) in the tool frame (w, x, y, z)."""
+    half = -bat.mount_angle / 2  # a positive turn about y takes +x towards -z
+    return np.array([math.cos(half), 0.0, math.sin(half), 0.0])
+
+
+def bat_inertial(bat: BatParameters, arm: Arm) -> Inertial:
+    """Return the bat as a solid cylinder, in the frame of the gripper's joint."""
+    along = np.array([math.cos(bat.mount_angle), 0.0, math.sin(bat.mount_angle)])
+    middle = bat.length / 2 - bat.behind_grip
+    axial = bat.mass * bat.radius**2 / 2
+    across = bat.mass * (3 * bat.radius**2 + bat.length**2) / 12
+    inertia = across * np.eye(3) + (axial - across) * np.outer(along, along)
+    return Inertial(bat.mass, np.array(arm.tool) + middle * along, inertia)
+
+
+def _add_bat(body: mujoco.MjsBody, bat: BatParameters, arm: Arm, agent: str) -> None:
+    quaternion = bat_quaternion(bat)
+    along = np.array([math.cos(bat.mount_angle), 0.0, math.sin(bat.mount_angle)])
+    grip = np.array(arm.tool)
+    back, front = grip - bat.behind_grip * along, grip + (bat.length - bat.behind_grip) * along
+    body.add_site(name=f"{agent}/bat", pos=arm.tool, quat=quaternion)
+    body.add_geom(
+        name=f"{agent}/bat",
+        type=_TYPE.mjGEOM_CAPSULE,
+        fromto=[*back, *front],
+        size=[bat.radius, 0.0, 0.0],
+        contype=0,
+        conaffinity=0,
+    )
+
+
+def _add_servo(spec: mujoco.MjSpec, parameters: ModelParameters, agent: str) -> None:
+    """Add the agent's 7 controls: three translations and an orientation of its tool."""
+    translation, orientation = parameters.servo.translation, parameters.servo.orientation
+    target, reference = f"{agent}/tool", f"{agent}/torso"
+    for axis in range(3):
+        servo = spec.add_actuator(
+            name=f"{agent}/{_AXES[axis]}",
+            trntype=mujoco.mjtTrn.mjTRN_SITE,
+            target=target,
+            refsite=reference,
+        )
+        servo.set_to_position(kp=translation.kp, kv=translation.kv)
+        servo.gear = [float(axis == other) for other in range(6)]
+    servo = spec.add_actuator(
+        name=f"{agent}/orientation",
+        trntype=mujoco.mjtTrn.mjTRN_SITE,
+        target=target,
+        refsite=reference,
+    )
+    chart = mujoco.mjtCtrlChart.mjCHART_QUAT
+    servo.set_to_orientation(kp=orientation.kp, kv=orientation.kv, ctrlspec=chart)
+
+
+def _add_sensors(spec: mujoco.MjSpec, agent: str) -> None:
+    """Add the agent's 20 numbers, in the order of ``FencingBatch.sensors``."""
+    kind, site = mujoco.mjtSensor, mujoco.mjtObj.mjOBJ_SITE
+    in_world = {
+        "position": kind.mjSENS_FRAMEPOS,
+        "quaternion": kind.mjSENS_FRAMEQUAT,
+        "linear_velocity": kind.mjSENS_FRAMELINVEL,
+        "angular_velocity": kind.mjSENS_FRAMEANGVEL,
+    }
+    for name, sensor in in_world.items():
+        spec.add_sensor(
+            name=f"{agent}/bat/{name}", type=sensor, objtype=site, objname=f"{agent}/bat"
+        )
+    for name in ("position", "quaternion"):
+        spec.add_sensor(
+            name=f"{agent}/tool/{name}",
+            type=in_world[name],
+            objtype=site,
+            objname=f"{agent}/tool",
+            reftype=site,
+            refname=f"{agent}/torso",
+        )
+
+
+def _add_contacts(spec: mujoco.MjSpec, cfg: SimConfig) -> None:
+    first, second = AGENTS
+    pairs = [(f"{first}/bat", f"{second}/bat")]
+    if cfg.bat_arm_contacts:
+        pairs += [
+            (f"{striker}/bat", f"{struck}/{link}")
+            for striker, struck in ((first, second), (second, first))
+            for link in _STRUCK
+        ]
+    for one, other in pairs:
+        spec.add_pair(name=f"{one} {other}", geomname1=one, geomname2=other, condim=3)
