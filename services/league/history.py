@@ -5,8 +5,7 @@ hold the same state because they applied the same events. Nothing here reads a c
 """
 
 import dataclasses
-from collections.abc import Callable, Iterable
-from typing import Any
+from collections.abc import Iterable
 
 from services.league import events
 from services.league.config import LeagueConfig
@@ -193,9 +192,8 @@ class RunState:
         """
         if entry.seq != self.position + 1:
             raise ValueError(f"event {entry.seq} follows event {self.position}; one is missing")
-        handler = _HANDLERS[type(entry.event)]
         try:
-            handler(self, entry.event, entry.at_ns)
+            self._take(entry.event, entry.at_ns)
         except (KeyError, IndexError) as error:
             raise ValueError(
                 f"event {entry.seq} ({entry.event.kind} {entry.event.key}) names {error} "
@@ -254,6 +252,33 @@ class RunState:
         return ref.removeprefix("sha256:")[:8]
 
     # The fold -------------------------------------------------------------------------------
+
+    def _take(self, event: events.Event, at_ns: int) -> None:
+        match event:
+            case events.RunStarted():
+                self._run_started(event, at_ns)
+            case events.StageStarted():
+                self._stage_started(event, at_ns)
+            case events.StageEnded():
+                self._stage_ended(event, at_ns)
+            case events.VersionEntered():
+                self._version(event, at_ns)
+            case events.LeaseGranted():
+                self._lease_granted(event, at_ns)
+            case events.LeaseEnded():
+                self._lease_ended(event, at_ns)
+            case events.BoutsPlayed():
+                self._bouts(event, at_ns)
+            case events.EvaluationPlanned():
+                self._evaluation_planned(event, at_ns)
+            case events.EvaluationDone():
+                self.evaluation_done_at_ns = at_ns
+            case events.IncidentNoted():
+                self._incident(event)
+            case events.RunFinished():
+                self.finished_at_ns = at_ns
+            case _:
+                raise ValueError(f"event kind {event.kind!r} has no meaning here")
 
     def _run_started(self, event: events.RunStarted, at_ns: int) -> None:
         self.run, self.seed, self.serial = event.run, event.seed, event.serial
@@ -340,29 +365,8 @@ class RunState:
                 played=[False] * pairing.bouts,
             )
 
-    def _evaluation_done(self, event: events.EvaluationDone, at_ns: int) -> None:
-        self.evaluation_done_at_ns = at_ns
-
-    def _incident(self, event: events.IncidentNoted, at_ns: int) -> None:
+    def _incident(self, event: events.IncidentNoted) -> None:
         self.incident_keys.add(event.key)
         self.incidents.append(
             IncidentRecord(event.source, event.what, event.detail, event.reported_at_ns)
         )
-
-    def _run_finished(self, event: events.RunFinished, at_ns: int) -> None:
-        self.finished_at_ns = at_ns
-
-
-_HANDLERS: dict[type[events.Event], Callable[[RunState, Any, int], None]] = {
-    events.RunStarted: RunState._run_started,
-    events.StageStarted: RunState._stage_started,
-    events.StageEnded: RunState._stage_ended,
-    events.VersionEntered: RunState._version,
-    events.LeaseGranted: RunState._lease_granted,
-    events.LeaseEnded: RunState._lease_ended,
-    events.BoutsPlayed: RunState._bouts,
-    events.EvaluationPlanned: RunState._evaluation_planned,
-    events.EvaluationDone: RunState._evaluation_done,
-    events.IncidentNoted: RunState._incident,
-    events.RunFinished: RunState._run_finished,
-}

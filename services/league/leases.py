@@ -1,0 +1,186 @@
+"""Work for actors: pure functions of the state, and the table of when live leases lapse.
+
+A lease is the only claim an actor has. An actor that vanishes stops renewing, its lease lapses,
+and what it had promised is granted again; nothing else remembers it.
+"""
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from services.league.config import LeagueConfig
+from services.league.events import LeaseGranted
+from services.league.history import EvaluationRecord, RunState
+from shared.messages.league import Lease, LeaseRequest, LeaseSummary
+
+
+def lease_seed(run_seed: int, number: int) -> int:
+    """Return the seed of a lease: 63 bits that follow from the run's seed and its number."""
+    sequence = np.random.SeedSequence((run_seed, number))
+    return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
+
+
+def lease_window(cfg: LeagueConfig, actors: int, *, serial: bool) -> int:
+    """Return how many unacknowledged rollouts each of this many actors may have.
+
+    Two batches between all of them: one that is learned from, one that is played meanwhile.
+    In a serial run exactly one batch: the lag is fixed and the run reproducible.
+    """
+    if serial:
+        return cfg.batch_rollouts
+    return math.ceil(2 * cfg.batch_rollouts / max(actors, 1))
+
+
+def grant(state: RunState, request: LeaseRequest) -> LeaseGranted | None:
+    """Return the work for an actor, None when there is none now."""
+    number = len(state.leases) + 1
+    record = state.stage
+    if record is not None:
+        stage = record.stage
+        learns = stage.agent == "antagonist"
+        return LeaseGranted(
+            lease=f"L{number:06d}",
+            number=number,
+            actor=request.actor,
+            boot=request.boot,
+            work="train",
+            stage=stage.index,
+            antagonist="" if learns else stage.opponent,
+            protagonist=stage.opponent if learns else "",
+            seed=lease_seed(state.seed, number),
+        )
+    for evaluation in state.evaluations.values():
+        chunk = open_chunk(state, evaluation, request.num_envs)
+        if chunk is not None:
+            return LeaseGranted(
+                lease=f"L{number:06d}",
+                number=number,
+                actor=request.actor,
+                boot=request.boot,
+                work="evaluate",
+                stage=-1,
+                antagonist=evaluation.antagonist,
+                protagonist=evaluation.protagonist,
+                first_bout=chunk.start,
+                bouts=len(chunk),
+                seed=lease_seed(state.seed, number),
+            )
+    return None
+
+
+def open_chunk(state: RunState, evaluation: EvaluationRecord, most: int) -> range | None:
+    """Return the first bouts of a pairing that are neither played nor promised, at most so many."""
+    taken = list(evaluation.played)
+    for lease in state.live_leases:
+        held = state.leases[lease].grant
+        if (held.antagonist, held.protagonist) == (evaluation.antagonist, evaluation.protagonist):
+            taken[held.first_bout : held.first_bout + held.bouts] = [True] * held.bouts
+    if False not in taken:
+        return None
+    start = taken.index(False)
+    free = itertools.takewhile(lambda bout: not taken[bout], range(start, len(taken)))
+    return range(start, start + min(len(list(free)), most))
+
+
+def overlapping(state: RunState, lease: str) -> list[str]:
+    """Return the live evaluation leases, but for this one, that hold a bout this one holds."""
+    own = state.leases[lease].grant
+    return [
+        other
+        for other in state.live_leases
+        if other != lease and _overlap(own, state.leases[other].grant)
+    ]
+
+
+def is_chunk_open(state: RunState, granted: LeaseGranted) -> bool:
+    """Return whether none of an evaluation lease's bouts has been played yet."""
+    record = state.evaluations[granted.antagonist, granted.protagonist]
+    return not any(record.played[granted.first_bout : granted.first_bout + granted.bouts])
+
+
+def training_actors(state: RunState) -> int:
+    """Return how many actors hold a training lease."""
+    return sum(state.leases[lease].grant.work == "train" for lease in state.live_leases)
+
+
+def lease_message(
+    state: RunState, granted: LeaseGranted, cfg: LeagueConfig, *, serial: bool
+) -> Lease:
+    """Return what an actor is told of its new lease."""
+    record = state.stages[granted.stage] if granted.work == "train" else None
+    return Lease(
+        lease=granted.lease,
+        kind=granted.work,
+        stage=record.stage if record is not None else None,
+        antagonist=granted.antagonist,
+        protagonist=granted.protagonist,
+        bouts=granted.bouts,
+        stochastic=granted.work == "train" or cfg.evaluation_stochastic,
+        seed=granted.seed,
+        expires_in=cfg.lease_seconds,
+        window=lease_window(cfg, training_actors(state), serial=serial),
+    )
+
+
+def summaries(state: RunState, cfg: LeagueConfig, now_ns: int) -> tuple[LeaseSummary, ...]:
+    """Return the training leases that are alive, and those that ended a moment ago."""
+    oldest_ns = now_ns - round(cfg.ended_lease_seconds * 1e9)
+    ended = itertools.takewhile(
+        lambda lease: state.leases[lease].ended_at_ns > oldest_ns, reversed(state.ended_leases)
+    )
+    return tuple(_summaries(state, sorted([*state.live_leases, *ended])))
+
+
+def _summaries(state: RunState, leases: Iterable[str]) -> Iterable[LeaseSummary]:
+    for lease in leases:
+        granted = state.leases[lease].grant
+        if granted.work == "train":
+            stage = state.stages[granted.stage].stage
+            yield LeaseSummary(
+                lease=lease,
+                actor=granted.actor,
+                agent=stage.agent,
+                stage=stage.index,
+                opponent=stage.opponent,
+                seed=granted.seed,
+            )
+
+
+def _overlap(one: LeaseGranted, other: LeaseGranted) -> bool:
+    return (
+        other.work == "evaluate"
+        and (one.antagonist, one.protagonist) == (other.antagonist, other.protagonist)
+        and one.first_bout < other.first_bout + other.bouts
+        and other.first_bout < one.first_bout + one.bouts
+    )
+
+
+@dataclasses.dataclass
+class LeaseTable:
+    """When each live lease lapses, on the league's own monotonic clock.
+
+    The one thing about leases that is not in the ledger: a restarted league gives every live
+    lease its full time again.
+    """
+
+    seconds: float
+    lapses_at: dict[str, float] = dataclasses.field(default_factory=dict[str, float])
+
+    def renew(self, lease: str, now: float) -> None:
+        """Give a lease its full time from now."""
+        self.lapses_at[lease] = now + self.seconds
+
+    def lapsed(self, state: RunState, now: float) -> list[str]:
+        """Return the live leases whose time is over, oldest first."""
+        self.follow(state, now)
+        return [lease for lease, at in self.lapses_at.items() if at <= now]
+
+    def follow(self, state: RunState, now: float) -> None:
+        """Drop the leases that have ended, and time those that are new here."""
+        live = state.live_leases
+        if self.lapses_at.keys() == live.keys():
+            return
+        self.lapses_at = {lease: self.lapses_at.get(lease, now + self.seconds) for lease in live}

@@ -1,0 +1,75 @@
+"""The snapshots of a run: one file each, named by the hash of its content, never changed."""
+
+import hashlib
+from pathlib import Path
+
+from shared.errors import SnapshotError
+from shared.policy.snapshot import MAX_BYTES, digest_of, unpack
+from shared.runtime.files import atomic_write
+
+
+class SnapshotStore:
+    """``<folder>/<sha256>.safetensors``."""
+
+    def __init__(self, folder: Path) -> None:
+        """Make the folder if need be.
+
+        Raises:
+            SnapshotError: the folder cannot be made.
+        """
+        self._folder = folder
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise SnapshotError(
+                f"snapshot folder {folder} cannot be made ({error.strerror}); make it writable"
+            ) from error
+
+    @property
+    def is_empty(self) -> bool:
+        """Return whether no snapshot was ever stored."""
+        return next(self._folder.glob("*.safetensors"), None) is None
+
+    def put(self, digest: str, payload: bytes) -> None:
+        """Store a snapshot; one that is stored already and sound is left alone.
+
+        Raises:
+            SnapshotError: the payload is not what ``digest`` names, too large, or not a snapshot
+                this build reads.
+            RiposteError: it cannot be written; nothing is left behind.
+        """
+        unpack(payload, digest)
+        path = self._path(digest)
+        try:
+            if path.read_bytes() == payload:
+                return
+        except OSError:
+            pass  # not there, or unreadable: write it (again)
+        atomic_write(path, payload)
+
+    def get(self, reference: str) -> bytes:
+        """Return the snapshot of a player reference.
+
+        Raises:
+            SnapshotError: no reference, not stored, or damaged on disk.
+        """
+        digest = digest_of(reference)
+        path = self._path(digest)
+        try:
+            with path.open("rb") as file:
+                payload = file.read(MAX_BYTES + 1)
+        except FileNotFoundError:
+            raise SnapshotError(
+                f"snapshot {digest[:12]} is not in {self._folder}; it was never reported here"
+            ) from None
+        except OSError as error:
+            raise SnapshotError(f"snapshot {path} cannot be read ({error.strerror})") from error
+        if (found := hashlib.sha256(payload).hexdigest()) != digest:
+            raise SnapshotError(
+                f"snapshot {path} is damaged (its content has hash {found[:12]}); "
+                "restore it from a copy of the run"
+            )
+        return payload
+
+    def _path(self, digest: str) -> Path:
+        return self._folder / f"{digest}.safetensors"
