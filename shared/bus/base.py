@@ -7,24 +7,41 @@ with a refusal that says why.
 """
 
 from collections.abc import Mapping
-from typing import Generic, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from shared.messages.message import Message
 from shared.messages.topics import Service, Topic
 
-M = TypeVar("M", bound=Message, covariant=True)
-Out = TypeVar("Out", bound=Message)
+M_co = TypeVar("M_co", bound=Message, covariant=True)
 In = TypeVar("In", bound=Message)
+In_co = TypeVar("In_co", bound=Message, covariant=True)
+Out = TypeVar("Out", bound=Message)
+Out_contra = TypeVar("Out_contra", bound=Message, contravariant=True)
 
 
-class Subscription(Protocol[M]):
+class Refused(Message, frozen=True):
+    """The other side answered that it will not, and why."""
+
+    reason: str
+    retry: bool = False
+    """It was only too busy: the same request may be accepted later."""
+
+
+class NoAnswer(Message, frozen=True):
+    """Nobody answered: no answerer on the bus, it died, or the deadline passed."""
+
+    reason: str
+
+
+class Subscription(Protocol[M_co]):
     """Values of one topic that have arrived and were not taken."""
 
-    def take(self) -> M | None:
+    def take(self) -> M_co | None:
         """Return the next value, or None.
 
         On a LATEST topic the newest value of each key that was not taken yet; a re-sent value
-        that was taken before is not returned again. On a STREAM topic the oldest waiting one.
+        that was taken before is not returned again. On a STREAM topic the oldest waiting one;
+        when too many wait, the oldest are dropped.
         """
         ...
 
@@ -33,24 +50,30 @@ class Subscription(Protocol[M]):
         ...
 
 
-class Request(Generic[In, Out]):
-    """A request that arrived; answer it with ``reply`` or ``refuse``, now or on a later tick."""
+class Request(Protocol[In_co, Out_contra]):
+    """A request that arrived; answer it with ``reply`` or ``refuse``, now or on a later tick.
 
-    message: In
+    A second answer, or one to an asker that has left, is ignored.
+    """
 
-    def reply(self, message: Out) -> None:
-        """Answer. A second answer, or one to an asker that has left, is ignored."""
-        raise NotImplementedError
+    @property
+    def message(self) -> In_co:
+        """Return what was asked; its arrays are read-only."""
+        ...
 
-    def refuse(self, reason: str) -> None:
+    def reply(self, message: Out_contra) -> None:
+        """Answer."""
+        ...
+
+    def refuse(self, reason: str, *, retry: bool = False) -> None:
         """Answer with an error that the asker gets as ``Refused``."""
-        raise NotImplementedError
+        ...
 
 
-class Inbox(Protocol[In, Out]):
+class Inbox(Protocol[In_co, Out_contra]):
     """Requests that have arrived, oldest first; bounded: above the bound askers are refused."""
 
-    def take(self) -> Request[In, Out] | None:
+    def take(self) -> Request[In_co, Out_contra] | None:
         """Return the oldest waiting request, or None."""
         ...
 
@@ -59,24 +82,12 @@ class Inbox(Protocol[In, Out]):
         ...
 
 
-class Pending(Protocol[M]):
+class Pending(Protocol[M_co]):
     """A request under way."""
 
-    def take(self) -> "M | Refused | NoAnswer | None":
-        """Return the answer once it is there, None while it may still come."""
+    def take(self) -> M_co | Refused | NoAnswer | None:
+        """Return the answer once it is there, and from then on; None while it may still come."""
         ...
-
-
-class Refused(Message, frozen=True):
-    """The other side answered that it will not, and why."""
-
-    reason: str
-
-
-class NoAnswer(Message, frozen=True):
-    """Nobody answered: no answerer on the bus, it died, or the deadline passed."""
-
-    reason: str
 
 
 class Bus(Protocol):
@@ -89,11 +100,15 @@ class Bus(Protocol):
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """Return counts since the start: bytes and messages in and out, refusals, reconnects."""
+        """Return counts since the start; ``shared.bus.counters`` names them."""
         ...
 
     def publish(self, topic: Topic[Out], message: Out, **fields: str) -> None:
-        """Send a value; a LATEST one is re-sent from ``wait`` every second until replaced."""
+        """Send a value; a LATEST one is re-sent from ``wait`` every second until replaced.
+
+        Raises:
+            ValueError: if the message or a field of the key is not what the topic says.
+        """
         ...
 
     def subscribe(self, topic: Topic[Out], **fields: str) -> Subscription[Out]:
@@ -119,9 +134,12 @@ class Bus(Protocol):
         ...
 
     def wait(self, timeout: float) -> bool:
-        """Wait until something can be taken, at most ``timeout`` seconds; do the upkeep.
+        """Wait until something new arrives, at most ``timeout`` seconds; do the upkeep.
 
-        Returns whether anything can be taken.
+        What arrived before the previous call returned does not end the wait, so a service that
+        leaves requests in its inbox on purpose does not spin.
+
+        Returns whether something new arrived.
 
         Raises:
             BusError: the session could not be restored within its limit.
@@ -129,5 +147,5 @@ class Bus(Protocol):
         ...
 
     def close(self) -> None:
-        """Leave the bus."""
+        """Leave the bus; what is asked or published afterwards goes nowhere."""
         ...

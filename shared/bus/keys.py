@@ -1,0 +1,57 @@
+"""Keys on the bus, from the templates of the topic table."""
+
+import re
+import string
+
+_CHUNK = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
+
+
+def key_of(template: str, fields: dict[str, str]) -> str:
+    """Return the key of a template such as ``learner/{agent}/rollout``.
+
+    Raises:
+        ValueError: if a field is missing, unknown, or not one plain chunk of a key.
+    """
+    missing = fields_of(template) - fields.keys()
+    if missing:
+        raise ValueError(f"key {template} needs {', '.join(sorted(missing))}")
+    return pattern_of(template, fields)
+
+
+def pattern_of(template: str, fields: dict[str, str]) -> str:
+    """Return the key with ``*`` for every field left out.
+
+    Raises:
+        ValueError: if a field is unknown, or not one plain chunk of a key.
+    """
+    names = fields_of(template)
+    unknown = fields.keys() - names
+    if unknown:
+        raise ValueError(f"key {template} has no field {', '.join(sorted(unknown))}")
+    for name, value in fields.items():
+        check_chunk(name, value)
+    return template.format(**{name: fields.get(name, "*") for name in names})
+
+
+def fields_of(template: str) -> set[str]:
+    """Return the names of a template's fields."""
+    return {name for _, name, _, _ in string.Formatter().parse(template) if name}
+
+
+def check_chunk(what: str, value: str) -> None:
+    """Refuse a text that cannot be one chunk of a key.
+
+    Raises:
+        ValueError: naming the value.
+    """
+    if not _CHUNK.fullmatch(value):
+        raise ValueError(
+            f"{what} {value!r} must be 1 to 64 letters, digits, '.', '_' or '-', "
+            "beginning with a letter or digit"
+        )
+
+
+def matches(pattern: str, key: str) -> bool:
+    """Return whether a key matches a pattern with ``*`` for whole chunks."""
+    want, have = pattern.split("/"), key.split("/")
+    return len(want) == len(have) and all(w in ("*", h) for w, h in zip(want, have, strict=True))
