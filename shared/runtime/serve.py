@@ -1,7 +1,7 @@
 """The frame of every service process: arguments, log, signals, bus, end.
 
-Exit codes: 0 told to stop; 1 did not stop in time; 2 bad input, do not start me again; 70 a bug; 75 the bus was lost,
-start me again.
+Exit codes: 0 told to stop; 1 did not stop in time; 2 bad input, do not start me again; 70 a bug;
+75 the bus was lost, start me again.
 """
 
 import argparse
@@ -168,7 +168,7 @@ def serve_plain(
     ``body`` must return soon after the event is set.
     """
     args = parse_args(role, sys.argv[1:] if argv is None else argv)
-    set_process_name(f"riposte {args.name}")
+    set_process_name(args.name)
     log_path = args.run / "logs" / f"{args.name}.jsonl"
     try:
         configure_logging(
