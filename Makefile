@@ -1,0 +1,66 @@
+# `make train` and `make test` set everything up on a fresh machine by themselves.
+
+VENV ?= .venv
+PYTHON ?= python3
+RUN ?= runs/latest
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+TEST_FLAGS ?=
+
+# One thread for each library in each process: spinning thread pools slow two cores down.
+export OMP_NUM_THREADS := 1
+export OPENBLAS_NUM_THREADS := 1
+export MKL_NUM_THREADS := 1
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.PHONY: help train test check format test-all chaos bench docs clean
+.DEFAULT_GOAL := help
+
+help: ## this list
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1|\2/' | column -t -s '|'
+
+$(STAMP): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "riposte needs Python 3.11 or newer; found $$($(PYTHON) --version): make PYTHON=python3.11 ..."; exit 2; }
+	@test -x $(BIN)/python || { echo "setting up: new environment in $(VENV)"; $(PYTHON) -m venv $(VENV) || \
+	  { echo "the venv module is missing; on Debian: apt install python3-venv"; exit 2; }; }
+	@echo "setting up: torch (the largest part, a few minutes on a slow line)"
+	@$(BIN)/pip install --quiet -c constraints.txt "$$(grep '^torch==' constraints.txt)"
+	@echo "setting up: everything else"
+	@$(BIN)/pip install --quiet -c constraints.txt -e '.[dev]'
+	@touch $@
+
+train: $(STAMP) ## train two fencers on this machine and write a report
+	@$(BIN)/riposte train $(ARGS)
+
+test: $(STAMP) ## unit, property, integration and replay tests
+	@$(BIN)/pytest -q -m "not slow and not chaos and not hardware and not gpu and not bench" \
+	  --ignore=tests/chaos --ignore=tests/hardware --ignore=tests/bench tests $(TEST_FLAGS)
+
+test-all: $(STAMP) ## every test that needs no robot
+	@$(BIN)/pytest -q -m "not hardware and not gpu" tests $(TEST_FLAGS)
+
+chaos: $(STAMP) ## tests that kill, delay and lose things
+	@$(BIN)/pytest -q -m chaos tests $(TEST_FLAGS)
+
+check: $(STAMP) ## format, lint, types, import rules
+	@$(BIN)/ruff format --check --quiet . || \
+	  { echo "not formatted as ruff does it (make format does it):"; \
+	    $(BIN)/ruff format --check . --output-format=concise; exit 1; }
+	@$(BIN)/ruff check --quiet .
+	@$(BIN)/pyright --pythonpath $(BIN)/python
+	@$(BIN)/lint-imports --no-cache --no-logo
+
+format: $(STAMP) ## rewrite the files as `make check` wants them
+	@$(BIN)/ruff format .
+	@$(BIN)/ruff check --fix .
+
+bench: $(STAMP) ## measure, and add a row to benchmarks/RESULTS.md
+	@$(BIN)/riposte bench $(ARGS)
+
+docs: $(STAMP) ## rewrite the generated parts of docs/
+	@$(BIN)/python -m shared.messages.table docs/architecture.md
+
+clean: ## remove the environment, caches and builds; runs/ stays
+	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
