@@ -74,7 +74,7 @@ class FencingEnv:
         """
         if out is None:
             out = np.empty((self.num_envs, OBS_DIM), np.float32)
-        seconds = self.scores.step * self.model.control_timestep
+        seconds = self.scores.step * self.model.cfg.control_timestep
         return self._encoders[side].encode(
             self._bats[side], self._bats[1 - side], seconds, out
         )

@@ -65,6 +65,7 @@ class FencingModel:
     @staticmethod
     def of(cfg: SimConfig, parameters: ModelParameters) -> "FencingModel":
         """Compile the scene with ``parameters`` in place of the file that ``cfg`` names."""
+        _silence()
         try:
             mj = build_spec(cfg, parameters).compile()
         except ValueError as error:
@@ -91,6 +92,12 @@ class FencingModel:
         """The agents' names in the order of every array."""
         return AGENTS
 
+    def to_xml(self) -> str:
+        """Return the physics as MJCF."""
+        spec = build_spec(self.cfg, self.parameters)
+        spec.compile()
+        return spec.to_xml()
+
     @cached_property
     def scene(self) -> mujoco.MjModel:
         """The same bodies and joints with something to look at; never stepped."""
@@ -102,6 +109,17 @@ class FencingModel:
     def shapes(self) -> tuple[Shape, ...]:
         """What any viewer needs to draw the scene, given the bodies' poses."""
         return shapes_of(self.scene)
+
+
+def _silence() -> None:
+    """Keep MuJoCo from printing, and from writing MUJOCO_LOG.TXT where the process stands.
+
+    What it would say is in the warning counters that ``FencingBatch.check`` reads.
+    """
+    config = mujoco.MjLogConfig.get()
+    config.logto_console = False
+    config.logto_file = False
+    config.set()
 
 
 def _en_garde(side: Side) -> Float64:
