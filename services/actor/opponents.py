@@ -1,0 +1,86 @@
+"""Opponents by reference: scripted ones built, snapshots fetched once and kept by hash."""
+
+from collections import OrderedDict
+
+from shared.bus.base import Bus, NoAnswer, Pending, Refused
+from shared.clock import Clock
+from shared.errors import SnapshotError
+from shared.messages.league import SnapshotReply, SnapshotRequest
+from shared.messages.topics import SNAPSHOT
+from shared.policy.mlp import GaussianPolicy
+from shared.policy.players import SCRIPTED_PREFIX, Player, SnapshotPlayer, scripted_player
+from shared.policy.snapshot import Fit, digest_of, unpack
+
+RETRY_DELAY = 0.5
+"""Seconds between a fetch that failed and the next."""
+
+
+class Opponents:
+    """A bounded cache of frozen policies, filled from the league."""
+
+    def __init__(self, bus: Bus, clock: Clock, fit: Fit, capacity: int, timeout: float) -> None:
+        """Make an empty cache.
+
+        Args:
+            bus: where the league answers.
+            clock: spaces the retries.
+            fit: what a policy must be made for.
+            capacity: policies kept; the least recently used one leaves.
+            timeout: seconds to wait for the league's answer.
+        """
+        self._bus = bus
+        self._clock = clock
+        self._fit = fit
+        self._capacity = capacity
+        self._timeout = timeout
+        self._policies: OrderedDict[str, GaussianPolicy] = OrderedDict()
+        self._pending: dict[str, Pending[SnapshotReply]] = {}
+        self._not_before: dict[str, float] = {}
+        self.last_failure = ""
+        """Why the latest fetch failed; empty after one that did not."""
+
+    def __len__(self) -> int:
+        """Return how many policies are kept."""
+        return len(self._policies)
+
+    def get(self, reference: str, stochastic: bool) -> Player | None:
+        """Return the player, or None while it is being fetched.
+
+        Raises:
+            SnapshotError: if the reference names nobody, or the policy does not fit.
+        """
+        if reference.startswith(SCRIPTED_PREFIX):
+            return scripted_player(reference)
+        digest = digest_of(reference)
+        if digest in self._policies:
+            self._policies.move_to_end(digest)
+            return SnapshotPlayer(self._policies[digest], stochastic)
+        self._fetch(digest)
+        if digest not in self._policies:
+            return None
+        return SnapshotPlayer(self._policies[digest], stochastic)
+
+    def _fetch(self, digest: str) -> None:
+        """Ask for a snapshot, or take the answer."""
+        pending = self._pending.get(digest)
+        if pending is None:
+            if self._clock.now() >= self._not_before.get(digest, float("-inf")):
+                self._pending[digest] = self._bus.ask(
+                    SNAPSHOT, SnapshotRequest(snapshot=digest), self._timeout
+                )
+            return
+        answer = pending.take()
+        if answer is None:
+            return
+        del self._pending[digest]
+        if isinstance(answer, NoAnswer | Refused) or not answer.found:
+            self.last_failure = f"snapshot {digest[:12]}: {answer.reason}"
+            self._not_before[digest] = self._clock.now() + RETRY_DELAY
+            return
+        snapshot = unpack(answer.payload.tobytes(), digest)
+        snapshot.check_fits(self._fit)
+        self.last_failure = ""
+        self._not_before.pop(digest, None)
+        self._policies[digest] = GaussianPolicy(snapshot.weights)
+        while len(self._policies) > self._capacity:
+            self._policies.popitem(last=False)

@@ -1,0 +1,443 @@
+"""The actor: asks for a lease, plays it, hands rollouts and results over, asks again."""
+
+import dataclasses
+
+import msgspec
+import structlog
+
+from services.actor.collector import Collector, Evaluation, Results, Segment
+from services.actor.config import ActorConfig
+from services.actor.frames import WORLD, FrameSampler
+from services.actor.opponents import Opponents
+from shared.bus.base import Bus, NoAnswer, Pending, Refused
+from shared.bus.delivery import Outbox
+from shared.clock import Clock
+from shared.errors import SnapshotError
+from shared.game.reward import RewardConfig
+from shared.messages.league import (
+    BoutResults,
+    Lease,
+    LeaseRenewal,
+    LeaseRequest,
+    LeaseStatus,
+)
+from shared.messages.topics import FRAMES, LEASE, POLICY, RENEWAL, RESULTS, ROLLOUT
+from shared.messages.training import AGENTS, Agent, PolicyAnnouncement, Receipt, Rollout
+from shared.policy.mlp import GaussianPolicy
+from shared.policy.players import Player
+from shared.policy.snapshot import Fit, unpack
+from shared.runtime.rate import Rate
+from shared.runtime.service import Health
+from shared.sim.env import FencingEnv
+
+log = structlog.get_logger()
+
+LEASE_RETRY = 0.2
+"""Seconds between two requests for work."""
+RESULTS_WINDOW = 256
+"""Result messages that may wait for the league."""
+
+
+@dataclasses.dataclass
+class LearningPolicy:
+    """The newest announced policy of the learning side."""
+
+    policy: GaussianPolicy
+    version: int
+    digest: str
+
+
+class Actor:
+    """Plays what the league leases it; keeps nothing else."""
+
+    def __init__(
+        self,
+        cfg: ActorConfig,
+        reward_cfg: RewardConfig,
+        env: FencingEnv,
+        fit: Fit,
+        bus: Bus,
+        clock: Clock,
+    ) -> None:
+        """Join the bus; work begins with the first tick.
+
+        Args:
+            cfg: sizes and periods.
+            reward_cfg: scales of the reward.
+            env: the worlds; their number is ``cfg.num_envs``.
+            fit: what a policy must be made for to play here.
+            bus: this process's end of the bus.
+            clock: decides when to ask again.
+
+        Raises:
+            ValueError: if a bout is no whole number of rollouts.
+        """
+        if env.rules.bout_steps % cfg.rollout_steps:
+            raise ValueError(
+                f"rollout_steps ({cfg.rollout_steps}) must divide the bout's "
+                f"{env.rules.bout_steps} steps"
+            )
+        self._cfg = cfg
+        self._reward_cfg = reward_cfg
+        self._env = env
+        self._fit = fit
+        self._bus = bus
+        self._clock = clock
+        self._opponents = Opponents(bus, clock, fit, cfg.opponent_cache, cfg.ask_timeout)
+        self._rollouts: dict[Agent, Outbox[Rollout, Receipt]] = {
+            agent: Outbox(
+                bus, ROLLOUT, clock, window=1, timeout=cfg.acknowledge_timeout, agent=agent
+            )
+            for agent in AGENTS
+        }
+        self._results: Outbox[BoutResults, Receipt] = Outbox(
+            bus, RESULTS, clock, window=RESULTS_WINDOW, timeout=cfg.ask_timeout
+        )
+        self._policies = {agent: bus.subscribe(POLICY, agent=agent) for agent in AGENTS}
+        self._learning: dict[Agent, LearningPolicy] = {}
+        self._frames = FrameSampler(env, clock, cfg.frame_period, cfg.frame_steps)
+        self._lease: Lease | None = None
+        self._collector: Collector | None = None
+        self._evaluation: Evaluation | None = None
+        self._requested: Pending[Lease] | None = None
+        self._ask_at = clock.now()
+        self._renewing: Pending[LeaseStatus] | None = None
+        self._renew_at = 0.0
+        self._expires_at = 0.0
+        self._rollout_sequence = 0
+        self._result_sequence = 0
+        self._samples = Rate(clock)
+        self._waiting = ""
+        self._waiting_since = clock.now()
+        self._last_error = ""
+        self._counters = {
+            "rollouts_acknowledged": 0,
+            "rollouts_dropped": 0,
+            "bouts": 0,
+            "leases": 0,
+            "steps": 0,
+        }
+
+    # -- the loop ---------------------------------------------------------------------------
+
+    def tick(self) -> bool:
+        """Do one piece of work: at most one rollout, or as many steps of an evaluation."""
+        did = self._pump()
+        did |= self._take_policies()
+        if self._lease is None:
+            return self._seek_lease() or did
+        self._keep_lease()
+        if self._lease is None:
+            return True
+        if self._collector is None and self._evaluation is None:
+            return self._start() or did
+        return self._play() or did
+
+    def _pump(self) -> bool:
+        """Hand over what is due, and count what was answered."""
+        did = False
+        for outbox in self._rollouts.values():
+            for rollout, receipt in outbox.pump():
+                did = True
+                self._account(rollout.name, receipt.accepted, receipt.reason)
+            for rollout, reason in outbox.take_refused():
+                self._account(rollout.name, accepted=False, reason=reason)
+        for results, receipt in self._results.pump():
+            did = True
+            if not receipt.accepted:
+                self._last_error = f"results {results.name} dropped: {receipt.reason}"
+                log.warning("results_dropped", name=results.name, reason=receipt.reason)
+        for results, reason in self._results.take_refused():
+            self._last_error = f"results {results.name} refused: {reason}"
+            log.warning("results_refused", name=results.name, reason=reason)
+        return did
+
+    def _account(self, name: str, accepted: bool, reason: str) -> None:
+        """Count an answered rollout."""
+        if accepted:
+            self._counters["rollouts_acknowledged"] += 1
+            log.info("rollout_acknowledged", name=name)
+        else:
+            self._counters["rollouts_dropped"] += 1
+            self._last_error = f"rollout {name} dropped: {reason}"
+            log.info("rollout_dropped", name=name, reason=reason)
+
+    def _take_policies(self) -> bool:
+        """Take the newest announced policies; one that does not fit is said and not used."""
+        did = False
+        for agent, subscription in self._policies.items():
+            while (announcement := subscription.take()) is not None:
+                did = True
+                self._learn_of(agent, announcement)
+        return did
+
+    def _learn_of(self, agent: Agent, announcement: PolicyAnnouncement) -> None:
+        try:
+            snapshot = unpack(announcement.payload.tobytes(), announcement.snapshot)
+            snapshot.check_fits(self._fit)
+        except SnapshotError as error:
+            self._last_error = str(error)
+            log.error("policy_refused", agent=agent, reason=str(error))
+            return
+        self._learning[agent] = LearningPolicy(
+            GaussianPolicy(snapshot.weights), announcement.policy_version, snapshot.digest
+        )
+
+    # -- the lease --------------------------------------------------------------------------
+
+    def _seek_lease(self) -> bool:
+        """Ask for work, or take the answer."""
+        if self._requested is None:
+            if self._clock.now() < self._ask_at:
+                return False
+            request = LeaseRequest(
+                actor=self._bus.name, boot=self._bus.boot, num_envs=self._env.num_envs
+            )
+            self._requested = self._bus.ask(LEASE, request, self._cfg.ask_timeout)
+            return True
+        answer = self._requested.take()
+        if answer is None:
+            self._wait_for("league: a lease")
+            return False
+        self._requested = None
+        self._ask_at = self._clock.now() + LEASE_RETRY
+        if isinstance(answer, NoAnswer | Refused):
+            self._wait_for(f"league: {answer.reason}")
+            return False
+        if answer.kind == "none":
+            self._wait_for(f"league: {answer.reason or 'no work now'}")
+            return False
+        self._lease = answer
+        self._counters["leases"] += 1
+        now = self._clock.now()
+        self._expires_at = now + answer.expires_in
+        self._renew_at = now + answer.expires_in / 3.0
+        log.info("lease_taken", lease=answer.lease, kind=answer.kind)
+        return True
+
+    def _keep_lease(self) -> None:
+        """Renew the lease in time; drop it when it has ended."""
+        assert self._lease is not None
+        now = self._clock.now()
+        if self._renewing is not None:
+            answer = self._renewing.take()
+            if isinstance(answer, LeaseStatus):
+                self._renewing = None
+                if not answer.alive:
+                    self._drop_lease("ended")
+                    return
+                self._expires_at = now + answer.expires_in
+                self._renew_at = now + answer.expires_in / 3.0
+                self._lease = msgspec.structs.replace(self._lease, window=answer.window)
+            elif answer is not None:
+                self._renewing = None
+                self._renew_at = now + LEASE_RETRY
+        elif now >= self._renew_at:
+            renewal = LeaseRenewal(
+                actor=self._bus.name, boot=self._bus.boot, lease=self._lease.lease
+            )
+            self._renewing = self._bus.ask(RENEWAL, renewal, self._cfg.ask_timeout)
+        if now >= self._expires_at:
+            self._drop_lease("lapsed")
+
+    def _drop_lease(self, why: str) -> None:
+        """Forget what was being played; what was handed over stays in the outboxes."""
+        assert self._lease is not None
+        log.info("lease_dropped", lease=self._lease.lease, why=why)
+        self._lease = None
+        self._collector = None
+        self._evaluation = None
+        self._renewing = None
+        self._frames.abandon()
+        self._ask_at = self._clock.now()
+
+    def _start(self) -> bool:
+        """Begin to play the lease once both players are here."""
+        lease = self._lease
+        assert lease is not None
+        try:
+            if lease.stage is not None:
+                return self._start_training(lease)
+            return self._start_evaluation(lease)
+        except SnapshotError as error:
+            self._last_error = str(error)
+            log.error("lease_refused", lease=lease.lease, reason=str(error))
+            self._drop_lease("unplayable")
+            self._ask_at = self._clock.now() + 1.0
+            return False
+
+    def _start_training(self, lease: Lease) -> bool:
+        stage = lease.stage
+        assert stage is not None
+        opponent = self._player(stage.opponent, stochastic=lease.stochastic)
+        if opponent is None:
+            return False
+        if stage.agent not in self._learning:
+            self._wait_for(f"learner {stage.agent}: its first policy")
+            return False
+        self._collector = Collector(
+            self._env,
+            AGENTS.index(stage.agent),
+            opponent,
+            self._cfg.rollout_steps,
+            stage.score_weight,
+            stage.shaping_weight,
+            self._reward_cfg,
+            lease.seed,
+        )
+        return True
+
+    def _start_evaluation(self, lease: Lease) -> bool:
+        players = [
+            self._player(reference, lease.stochastic)
+            for reference in (lease.antagonist, lease.protagonist)
+        ]
+        antagonist, protagonist = players
+        if antagonist is None or protagonist is None:
+            return False
+        self._evaluation = Evaluation(
+            self._env, (antagonist, protagonist), lease.bouts, lease.seed
+        )
+        return True
+
+    def _player(self, reference: str, stochastic: bool) -> Player | None:
+        player = self._opponents.get(reference, stochastic)
+        if player is None:
+            self._wait_for(f"league: snapshot {reference[:19]} {self._opponents.last_failure}")
+        return player
+
+    # -- playing ----------------------------------------------------------------------------
+
+    def _play(self) -> bool:
+        """Play one rollout, or a stretch of an evaluation."""
+        lease = self._lease
+        assert lease is not None
+        if self._results.full:
+            self._wait_for(f"league: {self._results.unacknowledged} results unacknowledged")
+            return False
+        if self._evaluation is not None:
+            results = self._evaluation.advance(self._cfg.rollout_steps, self._frames.on_step)
+            self._count_steps(self._cfg.rollout_steps)
+            self._show(lease, WORLD, (lease.antagonist, lease.protagonist))
+            if results is not None:
+                self._report(lease, results, (lease.antagonist, lease.protagonist))
+                self._drop_lease("done")
+            return True
+        return self._collect(lease)
+
+    def _collect(self, lease: Lease) -> bool:
+        stage = lease.stage
+        assert stage is not None
+        assert self._collector is not None
+        outbox = self._rollouts[stage.agent]
+        outbox.window = lease.window
+        if outbox.full:
+            self._wait_for(
+                f"learner {stage.agent}: {outbox.unacknowledged} rollouts unacknowledged"
+            )
+            return False
+        learning = self._learning[stage.agent]
+        segment = self._collector.collect(learning.policy, self._frames.on_step)
+        self._count_steps(self._cfg.rollout_steps)
+        outbox.put(self._rollout(lease, learning, segment))
+        self._rollout_sequence += 1
+        outbox.pump()
+        own = f"sha256:{learning.digest}"
+        pair = (own, stage.opponent) if stage.agent == "antagonist" else (stage.opponent, own)
+        self._show(lease, int(segment.bouts[WORLD]), pair)
+        if segment.results is not None:
+            self._report(lease, segment.results, pair)
+        return True
+
+    def _rollout(self, lease: Lease, learning: LearningPolicy, segment: Segment) -> Rollout:
+        stage = lease.stage
+        assert stage is not None
+        return Rollout(
+            agent=stage.agent,
+            actor=self._bus.name,
+            boot=self._bus.boot,
+            sequence=self._rollout_sequence,
+            lease=lease.lease,
+            stage=stage.index,
+            policy_version=learning.version,
+            snapshot=learning.digest,
+            opponent=stage.opponent,
+            model=self._env.model.hash,
+            seed=lease.seed,
+            bouts=segment.bouts,
+            first_step=segment.first_step,
+            obs=segment.obs,
+            last_obs=segment.last_obs,
+            actions=segment.actions,
+            means=segment.means,
+            stds=learning.policy.std,
+            log_probs=segment.log_probs,
+            rewards=segment.rewards,
+            truncated=segment.truncated,
+        )
+
+    def _report(self, lease: Lease, results: Results, players: tuple[str, str]) -> None:
+        """Hand finished bouts to the league."""
+        message = BoutResults(
+            actor=self._bus.name,
+            boot=self._bus.boot,
+            sequence=self._result_sequence,
+            lease=lease.lease,
+            kind="evaluate" if lease.stage is None else "train",
+            stage=-1 if lease.stage is None else lease.stage.index,
+            antagonist=players[0],
+            protagonist=players[1],
+            model=self._env.model.hash,
+            seed=lease.seed,
+            **dataclasses.asdict(results),
+        )
+        self._result_sequence += 1
+        self._counters["bouts"] += len(results.bouts)
+        self._results.put(message)
+        self._results.pump()
+
+    def _show(self, lease: Lease, bout: int, players: tuple[str, str]) -> None:
+        frames = self._frames.take(self._bus.name, lease.lease, bout, players)
+        if frames is not None:
+            self._bus.publish(FRAMES, frames, name=self._bus.name)
+
+    # -- how it is --------------------------------------------------------------------------
+
+    def _count_steps(self, steps: int) -> None:
+        count = steps * self._env.num_envs
+        self._counters["steps"] += count
+        self._samples.add(count)
+        self._waiting = ""
+
+    def _wait_for(self, what: str) -> None:
+        if not self._waiting:
+            self._waiting_since = self._clock.now()
+        self._waiting = what
+
+    @property
+    def quiet(self) -> bool:
+        """Return whether nothing is under way between this actor and anybody."""
+        outboxes = (*self._rollouts.values(), self._results)
+        return not any(outbox.unacknowledged for outbox in outboxes) and not self._requested
+
+    def health(self) -> Health:
+        """Return how this actor is."""
+        lease = self._lease
+        if lease is None:
+            state = "without a lease"
+        elif lease.stage is not None:
+            state = f"{lease.lease}: {lease.stage.agent} learns v {lease.stage.opponent[:19]}"
+        else:
+            state = f"{lease.lease}: {lease.antagonist[:15]} v {lease.protagonist[:15]}"
+        waited = self._clock.now() - self._waiting_since if self._waiting else 0.0
+        return Health(
+            state=state,
+            waiting_for=self._waiting,
+            waiting_seconds=waited,
+            rates={"steps_per_s": self._samples.per_second()},
+            counters={**self._counters, "opponents_cached": len(self._opponents)},
+            last_error=self._last_error,
+        )
+
+    def close(self) -> None:
+        """Nothing to finish: whatever was not acknowledged is played again by somebody."""

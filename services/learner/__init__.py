@@ -1,0 +1,5 @@
+"""One agent's PPO: rollouts in, policy versions out.
+
+Answers ``learner/{agent}/rollout``; asks ``league/version``; publishes ``learner/{agent}/policy``;
+reads ``league/schedule``. The only room with torch and rsl_rl.
+"""

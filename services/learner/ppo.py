@@ -1,0 +1,261 @@
+"""rsl_rl's PPO fed with rollouts that came over the bus: fill its storage, call ``update``.
+
+rsl_rl 5.5.1 reports no KL, clip fraction or explained variance and trains silently on rows that
+were never filled; this file fills every row itself and measures the rest.
+"""
+# pyright: basic
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from rsl_rl.algorithms import PPO
+from rsl_rl.models import MLPModel
+from rsl_rl.storage import RolloutStorage
+from tensordict import TensorDict
+
+from services.learner.config import LearnerConfig
+from services.learner.gae import advantages_and_returns
+from shared.errors import CheckpointError
+from shared.messages.training import ACTION_DIM, OBS_DIM, Rollout
+from shared.policy.mlp import PolicyWeights
+
+_GROUPS = {"actor": ["policy"], "critic": ["policy"]}
+
+
+@dataclasses.dataclass(frozen=True)
+class UpdateStats:
+    """What one PPO update did, over its own samples."""
+
+    samples: int
+    reward_mean: float
+    value_loss: float
+    surrogate_loss: float
+    entropy: float
+    approx_kl: float
+    clip_fraction: float
+    explained_variance: float
+    action_std: float
+
+
+def _observations(obs: torch.Tensor) -> TensorDict:
+    return TensorDict({"policy": obs}, batch_size=obs.shape[:-1])
+
+
+class PolicyOptimiser:
+    """Actor, critic, normalisers, Adam and the random state of one agent."""
+
+    def __init__(self, cfg: LearnerConfig, seed: int) -> None:
+        torch.set_num_threads(1)
+        self.cfg = cfg
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            self._algorithm = self._build()
+            self._random_state = torch.get_rng_state()
+
+    def _build(self) -> PPO:
+        """Return a fresh algorithm; draws the weights from torch's current generator."""
+        cfg = self.cfg
+        proto = _observations(torch.zeros(1, OBS_DIM))
+        actor = MLPModel(
+            proto,
+            _GROUPS,
+            "actor",
+            ACTION_DIM,
+            cfg.hidden_dims,
+            cfg.activation,
+            obs_normalization=True,
+            distribution_cfg={
+                "class_name": "GaussianDistribution",
+                "init_std": cfg.initial_std,
+                "std_type": "log",
+                "std_range": (cfg.minimum_std, cfg.maximum_std),
+            },
+        )
+        critic = MLPModel(
+            proto, _GROUPS, "critic", 1, cfg.hidden_dims, cfg.activation, obs_normalization=True
+        )
+        # A small last layer starts every policy near "hold still" (Andrychowicz 2021, sec. 3.2).
+        with torch.no_grad():
+            actor.mlp[-1].weight.mul_(0.1)
+            actor.mlp[-1].bias.zero_()
+        algorithm = PPO(
+            actor,
+            critic,
+            RolloutStorage("rl", 1, 1, proto, [ACTION_DIM]),
+            num_learning_epochs=cfg.epochs,
+            num_mini_batches=cfg.minibatches,
+            clip_param=cfg.clip,
+            gamma=cfg.gamma,
+            lam=cfg.gae_lambda,
+            value_loss_coef=cfg.value_loss_coef,
+            entropy_coef=cfg.entropy_coef,
+            learning_rate=cfg.learning_rate,
+            max_grad_norm=cfg.max_grad_norm,
+            use_clipped_value_loss=False,
+            schedule="fixed",
+        )
+        algorithm.train_mode()
+        return algorithm
+
+    def warm_up(self, rollouts: Sequence[Rollout]) -> None:
+        """Teach the normalisers, and nothing else, from these rollouts."""
+        obs = _observations(torch.from_numpy(_stack(rollouts, "obs")))
+        self._algorithm.actor.update_normalization(obs)
+        self._algorithm.critic.update_normalization(obs)
+
+    def update(self, rollouts: Sequence[Rollout]) -> UpdateStats:
+        """Run one PPO update on exactly these rollouts.
+
+        Args:
+            rollouts: checked ones; their rows are used in this order.
+        """
+        with torch.random.fork_rng(devices=[]):
+            torch.set_rng_state(self._random_state)
+            stats = self._update(rollouts)
+            self._random_state = torch.get_rng_state()
+        return stats
+
+    def _update(self, rollouts: Sequence[Rollout]) -> UpdateStats:
+        algorithm = self._algorithm
+        obs = _observations(torch.from_numpy(_stack(rollouts, "obs")))
+        actions = torch.from_numpy(_stack(rollouts, "actions"))
+        means = torch.from_numpy(_stack(rollouts, "means"))
+        old_log_probs = torch.from_numpy(_stack(rollouts, "log_probs"))
+        stds = torch.cat(
+            [torch.tensor(r.stds).expand(r.rewards.size, ACTION_DIM) for r in rollouts]
+        )
+        samples = len(actions)
+        with torch.no_grad():
+            values = algorithm.critic(obs).squeeze(-1)
+            advantages, returns = self._targets(rollouts, values)
+            normalised = (advantages - advantages.mean()) / (advantages.std() + 1e-8)
+
+        storage = RolloutStorage("rl", 1, samples, obs[:1], [ACTION_DIM])
+        storage.observations["policy"] = obs["policy"][:, None]
+        storage.actions = actions[:, None]
+        storage.values = values[:, None, None]
+        storage.actions_log_prob = old_log_probs[:, None, None]
+        storage.distribution_params = (means[:, None], stds[:, None])
+        storage.returns = returns[:, None, None]
+        storage.advantages = normalised[:, None, None]
+        storage.step = samples
+        algorithm.storage = storage
+        # rsl_rl moves the normaliser at the end of update(); what is measured below is measured
+        # with the policy as trained, before that, so the move is done here, afterwards.
+        algorithm.actor.eval()
+        algorithm.critic.eval()
+        losses = algorithm.update()
+        # Outside its range the clamped deviation has no gradient and would never come back.
+        with torch.no_grad():
+            algorithm.actor.distribution.log_std_param.clamp_(
+                math.log(self.cfg.minimum_std), math.log(self.cfg.maximum_std)
+            )
+        with torch.no_grad():
+            algorithm.actor(obs, stochastic_output=True)
+            log_probs = algorithm.actor.get_output_log_prob(actions)
+            new_params = algorithm.actor.output_distribution_params
+            divergence = algorithm.actor.get_kl_divergence((means, stds), new_params)
+            ratio = torch.exp(log_probs - old_log_probs)
+        algorithm.train_mode()
+        algorithm.actor.update_normalization(obs)
+        algorithm.critic.update_normalization(obs)
+        return UpdateStats(
+            samples=samples,
+            reward_mean=float(np.mean([r.rewards.mean() for r in rollouts])),
+            value_loss=float(losses["value"]),
+            surrogate_loss=float(losses["surrogate"]),
+            entropy=float(losses["entropy"]),
+            approx_kl=float(divergence.mean()),
+            clip_fraction=float(((ratio - 1.0).abs() > self.cfg.clip).float().mean()),
+            explained_variance=float(1.0 - (returns - values).var() / (returns.var() + 1e-8)),
+            action_std=float(new_params[1][0].mean()),
+        )
+
+    def _targets(
+        self, rollouts: Sequence[Rollout], values: torch.Tensor
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return advantages float32[M] and returns float32[M], rollout by rollout."""
+        last_obs = _observations(torch.from_numpy(_stack(rollouts, "last_obs", rows=1)))
+        last_values = self._algorithm.critic(last_obs).squeeze(-1)
+        advantages, returns = [], []
+        row, world = 0, 0
+        for rollout in rollouts:
+            steps, worlds = rollout.rewards.shape
+            one_advantages, one_returns = advantages_and_returns(
+                torch.tensor(rollout.rewards),
+                values[row : row + steps * worlds].view(steps, worlds),
+                last_values[world : world + worlds],
+                # A bout ends by its clock alone: truncated, never terminated.
+                torch.zeros(worlds, dtype=torch.bool),
+                self.cfg.gamma,
+                self.cfg.gae_lambda,
+            )
+            advantages.append(one_advantages.flatten())
+            returns.append(one_returns.flatten())
+            row += steps * worlds
+            world += worlds
+        return torch.cat(advantages), torch.cat(returns)
+
+    def weights(self) -> PolicyWeights:
+        """Return copies of what an actor needs to act."""
+        actor = self._algorithm.actor
+        linear = [m for m in actor.mlp if isinstance(m, torch.nn.Linear)]
+        return PolicyWeights(
+            obs_mean=_numpy(actor.obs_normalizer._mean[0]),
+            obs_std=_numpy(actor.obs_normalizer._std[0]),
+            layers=tuple((_numpy(m.weight), _numpy(m.bias)) for m in linear),
+            log_std=_numpy(actor.distribution.log_std_param),
+            activation=self.cfg.activation,
+        )
+
+    def state(self) -> dict[str, torch.Tensor]:
+        """Return every tensor that the next update depends on, by name."""
+        algorithm = self._algorithm
+        state = {"random_state": self._random_state.clone()}
+        for part in ("actor", "critic"):
+            for name, value in getattr(algorithm, part).state_dict().items():
+                state[f"{part}.{name}"] = value.detach().clone()
+        for index, moments in algorithm.optimizer.state_dict()["state"].items():
+            for name, value in moments.items():
+                state[f"adam.{index}.{name}"] = value.detach().clone()
+        return state
+
+    def restore(self, state: dict[str, torch.Tensor]) -> None:
+        """Continue from what ``state`` returned.
+
+        Raises:
+            CheckpointError: if a tensor is missing or has another shape.
+        """
+        algorithm = self._algorithm
+        optimizer = algorithm.optimizer.state_dict()
+        optimizer["state"] = {}
+        parts: dict[str, dict[str, torch.Tensor]] = {"actor": {}, "critic": {}}
+        try:
+            for name, value in state.items():
+                part, _, rest = name.partition(".")
+                if part == "adam":
+                    index, _, moment = rest.partition(".")
+                    optimizer["state"].setdefault(int(index), {})[moment] = value.clone()
+                elif part in parts:
+                    parts[part][rest] = value
+            for part, tensors in parts.items():
+                getattr(algorithm, part).load_state_dict(tensors)
+            algorithm.optimizer.load_state_dict(optimizer)
+            self._random_state = state["random_state"].clone()
+        except (KeyError, RuntimeError, ValueError) as error:
+            text = " ".join(str(error).split())
+            raise CheckpointError(f"checkpoint does not fit this network: {text}") from None
+
+
+def _stack(rollouts: Sequence[Rollout], field: str, rows: int = 2) -> NDArray[np.float32]:
+    """Return one field of all rollouts, their first ``rows`` axes flattened into one."""
+    parts = [getattr(rollout, field) for rollout in rollouts]
+    return np.concatenate([part.reshape(-1, *part.shape[rows:]) for part in parts])
+
+
+def _numpy(tensor: torch.Tensor) -> NDArray[np.float32]:
+    return tensor.detach().cpu().numpy().astype(np.float32, copy=True)

@@ -1,0 +1,99 @@
+"""Bats are capsules and the target is a sphere; both judges ask their questions here.
+
+Everything is vectorised over N worlds and works on positions in metres in one common frame.
+"""
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+
+@dataclasses.dataclass(frozen=True)
+class BatShape:
+    """A bat: a capsule along the x axis of the bat frame, whose origin is the grip."""
+
+    back: float = -0.05
+    """Where the axis begins (m); negative is behind the grip."""
+    front: float = 0.70
+    """Where the axis ends (m)."""
+    radius: float = 0.025
+    """Of the capsule (m)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Target:
+    """The spherical target area between the players, fixed in the world."""
+
+    centre: tuple[float, float, float] = (0.0, 0.0, 1.05)
+    """In the world frame (m)."""
+    radius: float = 0.20
+    """(m)."""
+
+
+def blade_direction(quaternions: Floats) -> Floats:
+    """Return the unit x axes of the frames with these orientations.
+
+    Args:
+        quaternions: float64[..., 4], unit, w x y z.
+
+    Returns:
+        float64[..., 3].
+    """
+    w, x, y, z = np.moveaxis(quaternions, -1, 0)
+    direction = np.empty((*quaternions.shape[:-1], 3))
+    direction[..., 0] = 1.0 - 2.0 * (y * y + z * z)
+    direction[..., 1] = 2.0 * (x * y + w * z)
+    direction[..., 2] = 2.0 * (x * z - w * y)
+    return direction
+
+
+def distance_to_target(grips: Floats, directions: Floats, bat: BatShape, target: Target) -> Floats:
+    """Return how far each bat's surface is from the surface of the target (m); negative inside.
+
+    Args:
+        grips: float64[N, 3], origins of the bat frames.
+        directions: float64[N, 3], unit vectors along the blades.
+        bat: shape of the bats.
+        target: the sphere.
+
+    Returns:
+        float64[N].
+    """
+    to_centre = np.asarray(target.centre) - grips
+    along = np.einsum("ij,ij->i", to_centre, directions)
+    np.clip(along, bat.back, bat.front, out=along)
+    gap = to_centre - along[:, None] * directions
+    return np.sqrt(np.einsum("ij,ij->i", gap, gap)) - (bat.radius + target.radius)
+
+
+def distance_between_bats(
+    grips_a: Floats, directions_a: Floats, grips_b: Floats, directions_b: Floats, bat: BatShape
+) -> Floats:
+    """Return the distance between the surfaces of two bats (m); negative where they overlap.
+
+    Closest points of two segments (Ericson 2005, section 5.1.9), with unit directions: the first
+    guess on A is clamped, B answers it, and A answers B; exact because the problem is convex.
+
+    Args:
+        grips_a: float64[N, 3], origin of each bat frame; ``grips_b`` likewise.
+        directions_a: float64[N, 3], unit vector along each blade; ``directions_b`` likewise.
+        bat: shape of both bats.
+
+    Returns:
+        float64[N].
+    """
+    offset = grips_a - grips_b
+    cosine = np.einsum("ij,ij->i", directions_a, directions_b)
+    a_offset = np.einsum("ij,ij->i", directions_a, offset)
+    b_offset = np.einsum("ij,ij->i", directions_b, offset)
+    # Parallel blades leave the first guess free; any finite one is corrected by the two answers.
+    sine_squared = np.maximum(1.0 - cosine * cosine, 1e-12)
+    on_a = np.clip((cosine * b_offset - a_offset) / sine_squared, bat.back, bat.front)
+    on_b = np.clip(cosine * on_a + b_offset, bat.back, bat.front)
+    on_a = np.clip(cosine * on_b - a_offset, bat.back, bat.front)
+    gap = offset + on_a[:, None] * directions_a - on_b[:, None] * directions_b
+    return np.sqrt(np.einsum("ij,ij->i", gap, gap)) - 2.0 * bat.radius
