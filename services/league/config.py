@@ -6,6 +6,8 @@ import msgspec
 class LeagueConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Schedule of phase one, its evaluation, and the leases."""
 
+    seed: int = 0
+    """Seed of the run; every lease's seed follows from it."""
     iterations: int = 2
     """Iterations of phase one; in each the antagonist learns first, then the protagonist."""
     antagonist_updates: int = 120
@@ -39,6 +41,7 @@ class LeagueConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
         Raises:
             ValueError: a value is out of its range; says which, and what is allowed.
         """
+        _check("seed", self.seed, 0, 2**63 - 1)
         _check("iterations", self.iterations, 1, 100)
         _check("antagonist_updates", self.antagonist_updates, 1, 1_000_000)
         _check("protagonist_updates", self.protagonist_updates, 1, 1_000_000)

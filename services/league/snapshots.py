@@ -4,6 +4,7 @@ import hashlib
 from pathlib import Path
 
 from shared.errors import SnapshotError
+from shared.messages.training import VersionReport
 from shared.policy.snapshot import MAX_BYTES, digest_of, unpack
 from shared.runtime.files import atomic_write
 
@@ -30,15 +31,22 @@ class SnapshotStore:
         """Return whether no snapshot was ever stored."""
         return next(self._folder.glob("*.safetensors"), None) is None
 
-    def put(self, digest: str, payload: bytes) -> None:
-        """Store a snapshot; one that is stored already and sound is left alone.
+    def put(self, report: VersionReport) -> None:
+        """Store a version's snapshot; one that is stored already and sound is left alone.
 
         Raises:
-            SnapshotError: the payload is not what ``digest`` names, too large, or not a snapshot
+            SnapshotError: the payload is not what the report says, too large, or not a snapshot
                 this build reads.
             RiposteError: it cannot be written; nothing is left behind.
         """
-        unpack(payload, digest)
+        digest = digest_of(f"sha256:{report.snapshot}")
+        payload = report.payload.tobytes()
+        card = unpack(payload, digest).card
+        if (card.agent, card.policy_version) != (report.agent, report.policy_version):
+            raise SnapshotError(
+                f"snapshot {digest[:12]} is version {card.policy_version} of {card.agent}, "
+                f"reported as version {report.policy_version} of {report.agent}"
+            )
         path = self._path(digest)
         try:
             if path.read_bytes() == payload:

@@ -1,0 +1,21 @@
+"""Process of the league: ``python -m services.league SITE.toml --name league-0 --run DIR``."""
+
+import sys
+
+from services.league.config import LeagueConfig
+from services.league.service import League
+from shared.bus.base import Bus
+from shared.clock import Clock
+from shared.game.rules import RuleBook
+from shared.runtime.serve import ServeArgs, serve
+
+
+def build(args: ServeArgs, bus: Bus, clock: Clock) -> League:
+    """Return the league of the run in ``args.run``."""
+    cfg = args.section("league", LeagueConfig)
+    rules = args.section("game", RuleBook)
+    return League(cfg, bus, clock, args.run, args.run_id, cfg.seed, False, rules=rules)
+
+
+if __name__ == "__main__":
+    sys.exit(serve("league", build))

@@ -1,0 +1,128 @@
+"""Where a run stands, for people: pure functions of the settings and the state."""
+
+import itertools
+import math
+from collections.abc import Sequence
+
+from services.league.config import LeagueConfig
+from services.league.history import RunState, VersionRecord
+from services.league.schedule import total_stages
+from shared.messages.live import Progress
+from shared.messages.training import AGENTS
+
+SCORE_BOUTS = 100
+"""The mean score is over this many of the latest complete bouts."""
+RATE_VERSIONS = 20
+"""Samples per second are measured over this many of the latest versions."""
+
+
+def progress_of(cfg: LeagueConfig, state: RunState, bout_steps: int, message: str) -> Progress:
+    """Return where the run stands."""
+    record = state.stages[-1] if state.stages else None
+    running = state.stage
+    scores = latest_scores(state)
+    mean, low, high = mean_interval(scores)
+    last = record.versions[-1] if record is not None and record.versions else None
+    metrics = last.metrics if last is not None else None
+    return Progress(
+        run=state.run,
+        stage=record.stage.index if record is not None else -1,
+        stages=total_stages(cfg),
+        phase=running.stage.phase if running is not None else phase_between(state),
+        iteration=record.stage.iteration if record is not None else 0,
+        agent=running.stage.agent if running is not None else "",
+        update=record.updates if record is not None else 0,
+        max_updates=record.stage.max_updates if record is not None else 0,
+        total_samples=sum(state.total_samples.values()),
+        score_mean=mean,
+        score_low=low,
+        score_high=high,
+        score_bouts=len(scores),
+        evaluations_done=state.evaluation_done,
+        evaluations_total=state.evaluation_total,
+        samples_per_s=samples_per_second(state) if running is not None else 0.0,
+        policy_lag_mean=metrics.policy_lag_mean if metrics is not None else 0.0,
+        approx_kl=metrics.approx_kl if metrics is not None else 0.0,
+        explained_variance=metrics.explained_variance if metrics is not None else 0.0,
+        dropped_rollouts=sum(i.what == "rollout_refused" for i in state.incidents),
+        eta_seconds=eta_seconds(cfg, state, bout_steps),
+        message=message,
+    )
+
+
+def phase_between(state: RunState) -> str:
+    """Return the phase in words while no stage runs."""
+    if state.finished:
+        return "finished"
+    return "evaluation" if state.evaluation_started_at_ns is not None else "start"
+
+
+def latest_scores(state: RunState) -> list[float]:
+    """Return the scores of the latest complete training bouts of the newest stage."""
+    if not state.stages:
+        return []
+    points = reversed(state.stages[-1].points)
+    newest_first = (score for point in points for score in reversed(point.score))
+    return list(itertools.islice(newest_first, SCORE_BOUTS))
+
+
+def mean_interval(values: Sequence[float]) -> tuple[float, float, float]:
+    """Return mean, low and high end of its 95 % interval (normal); zeros without values."""
+    count = len(values)
+    if not count:
+        return 0.0, 0.0, 0.0
+    mean = sum(values) / count
+    if count == 1:
+        return mean, mean, mean
+    variance = sum((value - mean) ** 2 for value in values) / (count - 1)
+    half = 1.96 * math.sqrt(variance / count)
+    return mean, mean - half, mean + half
+
+
+def recent_versions(state: RunState) -> list[VersionRecord]:
+    """Return the latest versions of the newest stage that has at least two, oldest first."""
+    for record in reversed(state.stages):
+        if len(record.versions) > 1:
+            return record.versions[-RATE_VERSIONS:]
+    return []
+
+
+def samples_per_second(state: RunState) -> float:
+    """Return how fast the newest versions came, in samples per second; 0 when unknown."""
+    versions = recent_versions(state)
+    if not versions:
+        return 0.0
+    seconds = (versions[-1].at_ns - versions[0].at_ns) / 1e9
+    samples = sum(version.metrics.samples for version in versions[1:] if version.metrics)
+    return samples / seconds if seconds > 0 else 0.0
+
+
+def eta_seconds(cfg: LeagueConfig, state: RunState, bout_steps: int) -> float:
+    """Return the seconds until the end if every stage uses its budget up, -1 when unknown."""
+    if state.finished:
+        return 0.0
+    rate = samples_per_second(state)
+    versions = [version.metrics.samples for version in recent_versions(state) if version.metrics]
+    if rate <= 0 or not versions:
+        return -1.0
+    seconds = remaining_updates(cfg, state) * (sum(versions) / len(versions)) / rate
+    if (started := state.evaluation_started_at_ns) is not None and state.evaluation_done:
+        elapsed = (state.last_at_ns - started) / 1e9
+        left = state.evaluation_total - state.evaluation_done
+        return seconds + left * elapsed / state.evaluation_done
+    left = state.evaluation_total or expected_evaluation_bouts(cfg)
+    return seconds + left * bout_steps / rate
+
+
+def remaining_updates(cfg: LeagueConfig, state: RunState) -> int:
+    """Return how many updates the stages still have, if each uses its budget up."""
+    budgets = [cfg.antagonist_updates, cfg.protagonist_updates] * cfg.iterations
+    left = sum(budgets[len(state.stages) :])
+    if (record := state.stage) is not None:
+        left += max(record.stage.max_updates - record.updates, 0)
+    return left
+
+
+def expected_evaluation_bouts(cfg: LeagueConfig) -> int:
+    """Return how many bouts the evaluation will have: everybody against everybody, and static."""
+    return cfg.evaluation_bouts * cfg.iterations * (1 + total_stages(cfg) // len(AGENTS))
