@@ -44,9 +44,8 @@ chaos: $(STAMP) ## tests that kill, delay and lose things
 	@$(BIN)/pytest -q -m chaos tests $(TEST_FLAGS)
 
 check: $(STAMP) ## format, lint, types, import rules
-	@$(BIN)/ruff format --check --quiet . || \
-	  { echo "not formatted as ruff does it (make format does it):"; \
-	    $(BIN)/ruff format --check . --output-format=concise; exit 1; }
+	@$(BIN)/ruff format --check --quiet --output-format=concise . || \
+	  { echo "make format rewrites these files"; exit 1; }
 	@$(BIN)/ruff check --quiet .
 	@$(BIN)/pyright --pythonpath $(BIN)/python
 	@$(BIN)/lint-imports --no-cache --no-logo

@@ -1,0 +1,108 @@
+"""`riposte`: one subcommand for each service and each job, imported only when it is called."""
+
+import importlib
+import os
+import sys
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from shared.errors import RiposteError
+
+
+class Command(NamedTuple):
+    """A subcommand: ``main(argv) -> exit code`` in ``module``."""
+
+    name: str
+    module: str
+    about: str
+
+
+JOBS = (
+    Command("train", "services.jobs.train", "train two fencers on this machine, with a report"),
+    Command("status", "services.jobs.status", "who runs, and who waits for whom"),
+    Command("watch", "services.jobs.watch", "look at a run while it goes"),
+    Command("report", "services.jobs.report", "write a run's HTML report"),
+    Command("bench", "services.jobs.bench", "measure against the limit, in one run"),
+    Command("doctor", "services.jobs.doctor", "check this machine and say what to do"),
+    Command("sim", "services.jobs.sim", "export the two-robot model as MJCF"),
+    Command("up", "services.jobs.up", "start and keep alive the processes a site file lists"),
+)
+SERVICES = (
+    Command("router", "services.router.__main__", "the bus's meeting point"),
+    Command("league", "services.league.__main__", "schedule, opponents, ledger"),
+    Command("learner", "services.learner.__main__", "one agent's PPO"),
+    Command("actor", "services.actor.__main__", "plays bouts in simulation"),
+    Command("recorder", "services.recorder.__main__", "writes and shows what happens"),
+)
+COMMANDS = {command.name: command for command in (*JOBS, *SERVICES)}
+
+EXTRAS = {
+    "torch": "train",
+    "rsl_rl": "train",
+    "tensordict": "train",
+    "matplotlib": "train",
+    "gymnasium": "env",
+    "pettingzoo": "env",
+    "cma": "identify",
+}
+"""Import name of an optional library: the extra that installs it."""
+
+EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command line; return the exit code."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    if not words or words[0] in ("-h", "--help", "help"):
+        print(_help())
+        return 0 if words else EXIT_BAD_INPUT
+    if words[0] in ("-V", "--version"):
+        from shared.runtime.service import version
+
+        print(f"riposte {version()}")
+        return 0
+    command = COMMANDS.get(words[0])
+    if command is None:
+        from shared.config.site import nearest
+
+        return _say(f"unknown command {words[0]!r}; {nearest(words[0], COMMANDS)}")
+    return _run(command, words[1:])
+
+
+def _run(command: Command, argv: Sequence[str]) -> int:
+    try:
+        entry: Callable[[Sequence[str]], int] = importlib.import_module(command.module).main
+        return entry(argv)
+    except RiposteError as error:
+        return _say(f"{command.name}: {error}")
+    except ModuleNotFoundError as error:
+        missing = (error.name or "").partition(".")[0]
+        if missing not in EXTRAS:
+            raise
+        extra = EXTRAS[missing]
+        return _say(f"{command.name} needs {missing}: pip install 'riposte[{extra}]'")
+    except KeyboardInterrupt:
+        _say(f"{command.name}: interrupted")
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:  # `riposte status | head`: nobody reads on
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _say(text: str) -> int:
+    print(f"riposte: {text}", file=sys.stderr)
+    return EXIT_BAD_INPUT
+
+
+def _help() -> str:
+    lines = ["usage: riposte COMMAND [ARGUMENTS]     riposte COMMAND --help", ""]
+    for title, commands in (("jobs", JOBS), ("services, each one process", SERVICES)):
+        lines.append(f"{title}:")
+        lines += [f"  {command.name:<10} {command.about}" for command in commands]
+        lines.append("")
+    return "\n".join([*lines, "riposte --version prints the version."])
+
+
+if __name__ == "__main__":
+    sys.exit(main())
