@@ -47,6 +47,7 @@ class Ledger:
         self._lock = _take_lock(path)
         try:
             self._connection = self._open()
+            self.check_writable()
         except BaseException:
             os.close(self._lock)
             raise
@@ -59,10 +60,6 @@ class Ledger:
                     _create(connection)
                 _check(connection, self.path)
                 connection.execute("PRAGMA synchronous = FULL")
-                # An update that changes nothing: a ledger that cannot be written is found out now.
-                connection.execute("BEGIN IMMEDIATE")
-                connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
-                connection.execute("COMMIT")
             except BaseException:
                 connection.close()
                 raise
@@ -96,6 +93,15 @@ class Ledger:
                     last += 1
                     entries.append(Entry(seq=last, at_ns=at_ns, event=event))
         return entries
+
+    def check_writable(self) -> None:
+        """Write something that changes nothing.
+
+        Raises:
+            LedgerError: no space, or the file can no longer be written.
+        """
+        with _explained(self.path), self._transaction():
+            self._connection.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
 
     def replay(self) -> Iterator[Entry]:
         """Yield every event, oldest first.

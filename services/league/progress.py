@@ -50,6 +50,22 @@ def progress_of(cfg: LeagueConfig, state: RunState, bout_steps: int, message: st
     )
 
 
+def describe(cfg: LeagueConfig, state: RunState) -> str:
+    """Return where the run stands in one line."""
+    if (record := state.stage) is not None:
+        stage = record.stage
+        return (
+            f"stage {stage.index + 1} of {total_stages(cfg)}: {stage.agent} learns, "
+            f"update {record.updates} of {stage.max_updates}"
+        )
+    if state.finished:
+        return "finished"
+    if state.evaluation_started_at_ns is not None:
+        return f"evaluation: {state.evaluation_done} of {state.evaluation_total} bouts played"
+    missing = [agent for agent in AGENTS if state.latest(agent) is None]
+    return f"waiting for version 0 of {' and '.join(missing)}"
+
+
 def phase_between(state: RunState) -> str:
     """Return the phase in words while no stage runs."""
     if state.finished:

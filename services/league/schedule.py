@@ -60,6 +60,13 @@ def waiting_for(state: RunState) -> str:
     return " and ".join(f"learner {agent}" for agent in missing)
 
 
+def stage_now(state: RunState) -> int:
+    """Return the index of the stage that runs, 0 before the first, -1 after the last."""
+    if (record := state.stage) is not None:
+        return record.stage.index
+    return -1 if state.stages else 0
+
+
 def stage_start(cfg: LeagueConfig, state: RunState) -> StageStarted | None:
     """Return the start of the next stage of phase one, None before both agents have a version."""
     index = len(state.stages)
