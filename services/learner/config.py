@@ -8,7 +8,9 @@ import msgspec
 class LearnerConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One agent's PPO; the defaults are those the README's numbers were made with."""
 
-    batch_samples: int = 40960
+    seed: int = 0
+    """Seed of the run; weights, minibatches and their order follow from it."""
+    batch_samples: int = 20480
     """Samples of one update; rollouts are gathered until there are that many."""
     hidden_dims: tuple[int, ...] = (64, 64)
     """Widths of the hidden layers, of actor and critic alike."""
@@ -33,7 +35,7 @@ class LearnerConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     max_grad_norm: float = 1.0
     max_lag: int = 1
     """Accept rollouts of versions down to current - this."""
-    warm_up_samples: int = 40960
+    warm_up_samples: int = 20480
     """Samples that only teach the observation normaliser before the first update."""
     keep_checkpoints: int = 3
     """Checkpoints kept on disk, newest first."""

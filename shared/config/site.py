@@ -19,7 +19,10 @@ from shared.errors import ConfigError
 S = TypeVar("S", bound=msgspec.Struct)
 Table = dict[str, Any]
 
-SECTIONS = ("bus", "sim", "game", "actor", "learner", "league", "recorder", "train")
+SECTIONS = (
+    "bus", "sim", "game", "action", "reward",
+    "router", "actor", "learner", "league", "recorder", "train",
+)  # fmt: skip
 """Every section a site file may have; each service reads its own."""
 
 _BARE_WORD = re.compile(r"[A-Za-z_./~][\w./:~@+-]*\Z")

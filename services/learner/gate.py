@@ -1,0 +1,117 @@
+"""Decides whether a rollout may be learned from; nothing in it is taken on trust."""
+
+import dataclasses
+import enum
+import math
+
+import numpy as np
+
+from shared.messages.league import LeaseSummary, Stage
+from shared.messages.training import ACTION_DIM, Agent, Rollout
+
+_LOG_PROB_TOLERANCE = 1e-2
+_STD_RANGE = (1e-4, 100.0)
+
+
+class Decision(enum.Enum):
+    """What to do with a rollout."""
+
+    LEARN = "learn"
+    DROP = "drop"
+    """It will never be of use: answer so."""
+    LATER = "later"
+    """What would decide it has not arrived here yet: let the actor ask again."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Ruling:
+    """A decision and its reason in one line."""
+
+    decision: Decision
+    reason: str = ""
+
+
+LEARN = Ruling(Decision.LEARN)
+
+
+def _drop(reason: str) -> Ruling:
+    return Ruling(Decision.DROP, reason)
+
+
+def check_provenance(
+    rollout: Rollout,
+    agent: Agent,
+    stage: Stage | None,
+    leases: dict[str, LeaseSummary],
+    model: str,
+) -> Ruling:
+    """Return whether a rollout comes from a bout that the league knows.
+
+    Args:
+        rollout: as it arrived, its arrays already of the registered shapes and finite.
+        agent: who learns here.
+        stage: of the league's schedule; None between stages.
+        leases: by name, alive or ended a moment ago.
+        model: hash of the simulator model of this run.
+    """
+    if rollout.agent != agent:
+        return _drop(f"it is for the {rollout.agent}, this learner is the {agent}'s")
+    if rollout.model != model:
+        return _drop(f"model {rollout.model[:12]} is not this run's {model[:12]}")
+    now = -1 if stage is None else stage.index
+    if rollout.stage > now:
+        return Ruling(Decision.LATER, f"stage {rollout.stage} is not known here yet")
+    if stage is None or rollout.stage < now or stage.agent != agent:
+        return _drop(f"stage {rollout.stage} is over")
+    lease = leases.get(rollout.lease)
+    if lease is None:
+        return Ruling(Decision.LATER, f"unknown bout: lease {rollout.lease} is not in the schedule")
+    for field in ("actor", "agent", "stage", "opponent", "seed"):
+        if (found := getattr(rollout, field)) != (wanted := getattr(lease, field)):
+            what = "mixed opponents" if field == "opponent" else f"wrong {field}"
+            return _drop(f"{what}: {found} in the rollout, {wanted} in lease {lease.lease}")
+    return LEARN
+
+
+def check_version(rollout: Rollout, current: int, oldest: int) -> Ruling:
+    """Return whether the version that acted is new enough.
+
+    Args:
+        rollout: the rollout.
+        current: this learner's version.
+        oldest: the oldest version that is still accepted.
+    """
+    if rollout.policy_version > current:
+        return Ruling(Decision.LATER, f"version {rollout.policy_version} is not made here yet")
+    if rollout.policy_version < oldest:
+        return _drop(f"stale: version {rollout.policy_version}, now {current}, oldest {oldest}")
+    return LEARN
+
+
+def check_contents(rollout: Rollout, bout_steps: int) -> Ruling:
+    """Return whether a rollout is consistent in itself.
+
+    Args:
+        rollout: the rollout.
+        bout_steps: control steps of a bout.
+    """
+    steps, worlds = rollout.rewards.shape
+    if steps == 0 or worlds == 0:
+        return _drop(f"empty: {steps} steps of {worlds} bouts")
+    if len(np.unique(rollout.bouts)) != worlds or rollout.bouts.min() < 0:
+        return _drop("a bout stands in two worlds, or has a negative number")
+    last = rollout.first_step.astype(np.int64) + steps
+    if rollout.first_step.min() < 0 or last.max() > bout_steps:
+        return _drop(f"a bout runs outside its {bout_steps} steps")
+    if not np.array_equal(rollout.truncated, last == bout_steps):
+        return _drop("truncated does not say which bouts ran out of time")
+    low, high = _STD_RANGE
+    if rollout.stds.min() < low or rollout.stds.max() > high:
+        return _drop(f"standard deviations are outside {low} .. {high}")
+    noise = (rollout.actions - rollout.means) / rollout.stds
+    expected = -0.5 * np.einsum("tni,tni->tn", noise, noise) - (
+        float(np.sum(np.log(rollout.stds))) + 0.5 * ACTION_DIM * math.log(2.0 * math.pi)
+    )
+    if np.abs(expected - rollout.log_probs).max() > _LOG_PROB_TOLERANCE:
+        return _drop("log probabilities are not those of the actions")
+    return LEARN

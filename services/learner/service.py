@@ -1,0 +1,492 @@
+"""The learner: gathers rollouts, updates, writes a checkpoint, has the version entered, answers.
+
+A rollout is answered only when a checkpoint holds the update made from it and the league has the
+version in its ledger. Whatever happens before, the actor still has the rollout and sends it again.
+"""
+
+import dataclasses
+from collections import Counter
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import structlog
+
+from services.learner.checkpoint import CheckpointStore, Meta
+from services.learner.config import LearnerConfig
+from services.learner.gate import (
+    Decision,
+    Ruling,
+    check_contents,
+    check_provenance,
+    check_version,
+)
+from services.learner.ppo import PolicyOptimiser, UpdateStats
+from shared.bus.base import Bus, Request
+from shared.bus.delivery import Applied, Outbox
+from shared.clock import Clock
+from shared.errors import RiposteError
+from shared.game.rules import RuleBook
+from shared.messages.league import Incident, LeaseSummary, Stage
+from shared.messages.message import Bytes
+from shared.messages.topics import INCIDENT, POLICY, ROLLOUT, SCHEDULE, VERSION
+from shared.messages.training import (
+    Agent,
+    PolicyAnnouncement,
+    Receipt,
+    Rollout,
+    UpdateMetrics,
+    VersionReceipt,
+    VersionReport,
+)
+from shared.policy.action import ACTION_SCHEMA
+from shared.policy.observation import OBSERVATION_SCHEMA
+from shared.policy.snapshot import Card, Fit, Snapshot, normaliser_hash, pack
+from shared.runtime.rate import Rate
+from shared.runtime.service import Health
+
+log = structlog.get_logger()
+
+REPORT_TIMEOUT = 5.0
+"""Seconds to wait for the league before a version is reported again."""
+UNKNOWN_LEASE_SECONDS = 10.0
+"""How long a rollout may be told to ask again before it is dropped."""
+HELD_BATCHES = 4
+"""Rollouts held at once, in batches; more are told to ask again."""
+
+Held = tuple[Request[Rollout, Receipt], Rollout]
+
+
+@dataclasses.dataclass(frozen=True)
+class RunFacts:
+    """What a learner must know of its run to sign snapshots and to check rollouts."""
+
+    run: str
+    seed: int
+    fit: Fit
+    """With the model's hash."""
+    rules: RuleBook
+
+
+class Learner:
+    """One agent's PPO."""
+
+    def __init__(
+        self,
+        cfg: LearnerConfig,
+        agent: Agent,
+        facts: RunFacts,
+        folder: Path,
+        bus: Bus,
+        clock: Clock,
+        *,
+        version: int | None = None,
+    ) -> None:
+        """Continue from the newest usable checkpoint, or begin.
+
+        Args:
+            cfg: PPO's numbers.
+            agent: who learns here.
+            facts: of the run.
+            folder: of this agent's checkpoints.
+            bus: this process's end of the bus.
+            clock: spaces the reports.
+            version: continue from exactly this checkpoint and forget newer ones (serial resume).
+
+        Raises:
+            CheckpointError: there are checkpoints, and none is usable.
+        """
+        self._cfg = cfg
+        self._agent: Agent = agent
+        self._facts = facts
+        self._bus = bus
+        self._clock = clock
+        self._optimiser = PolicyOptimiser(cfg, _seed_of(facts.seed, agent))
+        self._store = CheckpointStore(folder, facts.run, agent, cfg.keep_checkpoints)
+        self._inbox = bus.answer(ROLLOUT, agent=agent)
+        self._schedule = bus.subscribe(SCHEDULE)
+        self._reports: Outbox[VersionReport, VersionReceipt] = Outbox(
+            bus, VERSION, clock, window=1, timeout=REPORT_TIMEOUT
+        )
+        self._incidents: Outbox[Incident, Receipt] = Outbox(
+            bus, INCIDENT, clock, window=64, timeout=REPORT_TIMEOUT
+        )
+        self._incident_sequence = 0
+        self._stage: Stage | None = None
+        self._leases: dict[str, LeaseSummary] = {}
+        self._applied = Applied()
+        self._total_samples = 0
+        self._announced = False
+        self._gathered: list[Held] = []
+        self._committing: list[Held] = []
+        self._first_refused_at: dict[str, float] = {}
+        self._waiting_since = clock.now()
+        self._samples = Rate(clock, 20.0)
+        self._last_metrics: UpdateMetrics | None = None
+        self._last_error = ""
+        self._counters: Counter[str] = Counter(
+            rollouts_accepted=0, rollouts_dropped=0, rollouts_repeated=0, updates=0
+        )
+        self._meta = self._begin(version)
+        self._snapshot = self._make_snapshot()
+        self._report()
+
+    @property
+    def version(self) -> int:
+        """Return the newest policy version."""
+        return self._meta.policy_version
+
+    @property
+    def quiet(self) -> bool:
+        """Return whether nothing is under way between this learner and anybody."""
+        waiting = self._gathered or self._committing
+        return self._announced and not waiting and not self._reports.unacknowledged
+
+    def _begin(self, version: int | None) -> Meta:
+        """Return the checkpoint to continue from, made now when there is none."""
+        if version is not None:
+            self._store.discard_after(version)
+            meta, tensors = self._store.load(version)
+            faults: list[str] = []
+        elif (found := self._store.load_newest()) is not None:
+            meta, tensors, faults = found
+        else:
+            meta = self._meta_of(0, -1, (), None)
+            self._store.save(meta, self._optimiser.state())
+            return meta
+        for fault in faults:
+            self._last_error = fault
+            self._note("checkpoint_corrupt", f"{fault}; continued from version {meta.policy_version}")
+        self._optimiser.restore(tensors)
+        self._applied = Applied.from_json(meta.applied)
+        self._total_samples = meta.total_samples
+        self._last_metrics = meta.metrics
+        log.info("checkpoint_restored", version=meta.policy_version)
+        return meta
+
+    # -- the loop ---------------------------------------------------------------------------
+
+    def tick(self) -> bool:
+        """Take what arrived, and update when there is enough of it."""
+        did = self._take_schedule()
+        did |= self._take_receipt()
+        self._incidents.pump()
+        did |= self._take_rollouts()
+        if self._announced and not self._committing and self._enough():
+            self._update()
+            did = True
+        return did
+
+    def _take_schedule(self) -> bool:
+        did = False
+        while (schedule := self._schedule.take()) is not None:
+            did = True
+            self._stage = schedule.stage
+            self._leases = {lease.lease: lease for lease in schedule.leases}
+            if self._gathered and not self._in_turn():
+                self._release("the stage is over")
+        return did
+
+    def _in_turn(self) -> bool:
+        return self._stage is not None and self._stage.agent == self._agent
+
+    def _take_receipt(self) -> bool:
+        """Take the league's answer to the version report: then, and only then, answer rollouts."""
+        did = False
+        for report, receipt in self._reports.pump():
+            did = True
+            if not receipt.accepted:
+                self._renumber(report, receipt)
+                continue
+            for request, _ in self._committing:
+                request.reply(Receipt(accepted=True))
+            self._committing = []
+            self._announce()
+            if self._stage is not None and receipt.stage != self._stage.index:
+                self._stage = None
+                self._release("the stage is over")
+        for _, reason in self._reports.take_refused():
+            raise RiposteError(f"the league refused version {self.version}: {reason}")
+        return did
+
+    def _renumber(self, report: VersionReport, receipt: VersionReceipt) -> None:
+        """The ledger holds another policy under this version: go on above it."""
+        version = receipt.latest_version + 1
+        log.warning("version_renumbered", version=report.policy_version, now=version)
+        self._note(
+            "version_renumbered",
+            f"{self._agent} version {report.policy_version} is taken by another policy "
+            f"({receipt.reason}); continued as version {version}",
+        )
+        self._meta = msgspec.structs.replace(self._meta, policy_version=version)
+        self._store.save(self._meta, self._optimiser.state())
+        self._snapshot = self._make_snapshot()
+        self._report()
+
+    def _take_rollouts(self) -> bool:
+        did = False
+        while (request := self._inbox.take()) is not None:
+            did = True
+            self._consider(request)
+        return did
+
+    def _consider(self, request: Request[Rollout, Receipt]) -> None:
+        """Hold a rollout, drop it, or let its actor ask again."""
+        rollout = request.message
+        if self._applied.contains(rollout.boot, rollout.sequence):
+            self._repeated(request)
+            return
+        for held in (self._gathered, self._committing):
+            for index, (_, other) in enumerate(held):
+                if other.name == rollout.name:
+                    held[index] = (request, other)
+                    self._counters["rollouts_repeated"] += 1
+                    return
+        ruling = self._rule(rollout)
+        if ruling.decision is Decision.LEARN:
+            self._first_refused_at.pop(rollout.lease, None)
+            self._gathered.append((request, rollout))
+        elif ruling.decision is Decision.LATER and not self._too_late(rollout.lease):
+            request.refuse(ruling.reason, retry=True)
+        else:
+            self._counters["rollouts_dropped"] += 1
+            self._last_error = f"dropped rollout {rollout.name}: {ruling.reason}"
+            log.info("rollout_dropped", name=rollout.name, reason=ruling.reason)
+            request.reply(Receipt(accepted=False, reason=ruling.reason))
+
+    def _repeated(self, request: Request[Rollout, Receipt]) -> None:
+        """Answer a rollout that has been learned from, once its version is in the ledger."""
+        self._counters["rollouts_repeated"] += 1
+        if self._announced and request.message.name not in self._meta.rollouts:
+            request.reply(Receipt(accepted=True))
+        elif not self._reports.unacknowledged:
+            request.reply(Receipt(accepted=True))
+        else:
+            request.refuse("its version is being entered in the ledger", retry=True)
+
+    def _rule(self, rollout: Rollout) -> Ruling:
+        limit = HELD_BATCHES * max(self._cfg.batch_samples, self._cfg.warm_up_samples)
+        if sum(held.rewards.size for _, held in self._gathered) >= limit:
+            return Ruling(Decision.LATER, "enough rollouts are held here")
+        model = self._facts.fit.model or ""
+        ruling = check_provenance(rollout, self._agent, self._stage, self._leases, model)
+        if ruling.decision is Decision.LEARN:
+            ruling = check_version(rollout, self.version, self._oldest())
+        if ruling.decision is Decision.LEARN:
+            ruling = check_contents(rollout, self._facts.rules.bout_steps)
+        return ruling
+
+    def _oldest(self) -> int:
+        """Return the oldest version accepted; version 0 acted without a normaliser."""
+        if self.version == 0:
+            return 0
+        floor = 1 if self._cfg.warm_up_samples else 0
+        return max(floor, self.version - self._cfg.max_lag)
+
+    def _too_late(self, lease: str) -> bool:
+        now = self._clock.now()
+        if len(self._first_refused_at) > 1024:
+            self._first_refused_at.clear()
+        return now - self._first_refused_at.setdefault(lease, now) > UNKNOWN_LEASE_SECONDS
+
+    def _release(self, reason: str) -> None:
+        """Answer the rollouts that will not be learned from."""
+        for request, _ in self._gathered:
+            self._counters["rollouts_dropped"] += 1
+            request.reply(Receipt(accepted=False, reason=reason))
+        self._gathered = []
+
+    # -- updating ---------------------------------------------------------------------------
+
+    def _enough(self) -> bool:
+        needed = self._cfg.batch_samples
+        if self.version == 0 and self._cfg.warm_up_samples:
+            needed = self._cfg.warm_up_samples
+        return sum(rollout.rewards.size for _, rollout in self._gathered) >= needed
+
+    def _update(self) -> None:
+        """Learn from what was gathered, write the checkpoint, report the version."""
+        self._drop_stale()
+        if not self._enough():
+            return
+        self._committing, self._gathered = self._gathered, []
+        rollouts = [rollout for _, rollout in self._committing]
+        began_at = self._clock.now()
+        waited = self._clock.now() - self._waiting_since
+        metrics = None
+        if self.version == 0 and self._cfg.warm_up_samples:
+            self._optimiser.warm_up(rollouts)
+        else:
+            stats = self._optimiser.update(rollouts)
+            lag = float(np.mean([self.version - r.policy_version for r in rollouts]))
+            self._total_samples += stats.samples
+            seconds = self._clock.now() - began_at
+            metrics = self._metrics(stats, lag, waited, seconds)
+        self._counters["updates"] += 1
+        self._counters["rollouts_accepted"] += len(rollouts)
+        self._samples.add(sum(r.rewards.size for r in rollouts))
+        for rollout in rollouts:
+            self._applied.add(rollout.boot, rollout.sequence)
+        names = tuple(rollout.name for rollout in rollouts)
+        self._meta = self._meta_of(self.version + 1, rollouts[0].stage, names, metrics)
+        self._last_metrics = metrics
+        self._store.save(self._meta, self._optimiser.state())
+        self._snapshot = self._make_snapshot()
+        self._report()
+
+    def _drop_stale(self) -> None:
+        """Drop gathered rollouts that have become too old meanwhile."""
+        fresh: list[Held] = []
+        for request, rollout in self._gathered:
+            ruling = check_version(rollout, self.version, self._oldest())
+            if ruling.decision is Decision.LEARN:
+                fresh.append((request, rollout))
+            else:
+                self._counters["rollouts_dropped"] += 1
+                request.reply(Receipt(accepted=False, reason=ruling.reason))
+        self._gathered = fresh
+
+    def _metrics(
+        self, stats: UpdateStats, lag: float, waited: float, seconds: float
+    ) -> UpdateMetrics:
+        return UpdateMetrics(
+            samples=stats.samples,
+            total_samples=self._total_samples,
+            reward_mean=stats.reward_mean,
+            value_loss=stats.value_loss,
+            surrogate_loss=stats.surrogate_loss,
+            entropy=stats.entropy,
+            approx_kl=stats.approx_kl,
+            clip_fraction=stats.clip_fraction,
+            explained_variance=stats.explained_variance,
+            policy_lag_mean=lag,
+            learning_rate=self._cfg.learning_rate,
+            action_std=stats.action_std,
+            wait_seconds=waited,
+            update_seconds=seconds,
+        )
+
+    def _meta_of(
+        self, version: int, stage: int, rollouts: tuple[str, ...], metrics: UpdateMetrics | None
+    ) -> Meta:
+        return Meta(
+            run=self._facts.run,
+            agent=self._agent,
+            seed=self._facts.seed,
+            policy_version=version,
+            stage=stage,
+            total_samples=self._total_samples,
+            applied=self._applied.to_json(),
+            rollouts=rollouts,
+            metrics=metrics,
+        )
+
+    def _make_snapshot(self) -> Snapshot:
+        weights = self._optimiser.weights()
+        fit = self._facts.fit
+        card = Card(
+            agent=self._agent,
+            policy_version=self.version,
+            stage=self._meta.stage,
+            run=self._facts.run,
+            seed=self._facts.seed,
+            total_samples=self._total_samples,
+            observation_schema=OBSERVATION_SCHEMA,
+            action_schema=ACTION_SCHEMA,
+            normaliser=normaliser_hash(weights.obs_mean, weights.obs_std),
+            control_timestep=fit.control_timestep,
+            offset_bound_m=fit.offset_bound_m,
+            offset_bound_rad=fit.offset_bound_rad,
+            model=fit.model or "",
+            activation=self._cfg.activation,
+            hidden_dims=self._cfg.hidden_dims,
+        )
+        return pack(card, weights)
+
+    def _report(self) -> None:
+        """Ask the league to enter the newest version; actors get it when that is done."""
+        self._announced = False
+        self._reports.put(
+            VersionReport(
+                agent=self._agent,
+                policy_version=self.version,
+                stage=self._meta.stage,
+                snapshot=self._snapshot.digest,
+                payload=_bytes(self._snapshot),
+                rollouts=self._meta.rollouts,
+                metrics=self._meta.metrics,
+            )
+        )
+        self._reports.pump()
+
+    def _announce(self) -> None:
+        self._announced = True
+        self._waiting_since = self._clock.now()
+        self._bus.publish(
+            POLICY,
+            PolicyAnnouncement(
+                agent=self._agent,
+                policy_version=self.version,
+                stage=self._meta.stage,
+                snapshot=self._snapshot.digest,
+                payload=_bytes(self._snapshot),
+            ),
+            agent=self._agent,
+        )
+
+    # -- how it is --------------------------------------------------------------------------
+
+    def _note(self, kind: str, detail: str) -> None:
+        """Tell the report of something worth a line."""
+        if self._incidents.full:
+            return
+        self._incidents.put(
+            Incident(
+                source=self._bus.name,
+                boot=self._bus.boot,
+                sequence=self._incident_sequence,
+                kind=kind,
+                detail=detail,
+                at_ns=self._clock.wall_ns(),
+            )
+        )
+        self._incident_sequence += 1
+
+    def health(self) -> Health:
+        """Return how this learner is."""
+        waiting = ""
+        if not self._announced:
+            reason = self._reports.last_failure or "to enter the version"
+            waiting, state = f"league: {reason}", f"version {self.version} made"
+        elif self._in_turn():
+            gathered = sum(rollout.rewards.size for _, rollout in self._gathered)
+            state = f"version {self.version}: {gathered} of {self._cfg.batch_samples} samples"
+            waiting = "actors: rollouts"
+        else:
+            state = f"version {self.version}, not in turn"
+        rates = {"samples_per_s": self._samples.per_second()}
+        if self._last_metrics is not None:
+            rates["policy_lag"] = self._last_metrics.policy_lag_mean
+            rates["update_seconds"] = self._last_metrics.update_seconds
+        return Health(
+            state=state,
+            waiting_for=waiting,
+            waiting_seconds=self._clock.now() - self._waiting_since if waiting else 0.0,
+            rates=rates,
+            counters=dict(self._counters),
+            last_error=self._last_error,
+        )
+
+    def close(self) -> None:
+        """Nothing to finish: the checkpoint is written, and unanswered rollouts are sent again."""
+
+
+def _bytes(snapshot: Snapshot) -> Bytes:
+    return np.frombuffer(snapshot.payload, np.uint8)
+
+
+def _seed_of(seed: int, agent: Agent) -> int:
+    """Return the agent's own seed in a run."""
+    return seed * 2 + (agent == "protagonist")
+
+
