@@ -174,7 +174,9 @@ def combine(parts: list[Inertial]) -> Inertial:
     inertia = np.zeros((3, 3))
     for part in parts:
         offset = part.com - com
-        inertia += part.inertia + part.mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+        inertia += part.inertia + part.mass * (
+            offset @ offset * np.eye(3) - np.outer(offset, offset)
+        )
     return Inertial(mass=mass, com=com, inertia=inertia)
 
 
@@ -192,7 +194,9 @@ def _carried(links: tuple[_Link, ...], joint: JointName, side: Side) -> Inertial
     """
     return combine(
         [
-            Inertial(link.mass_kg, np.array(link.com_m) + link.offset_m, _matrix(link.inertia_kg_m2))
+            Inertial(
+                link.mass_kg, np.array(link.com_m) + link.offset_m, _matrix(link.inertia_kg_m2)
+            )
             for link in links
             if link.joint == joint and link.side in (None, side) and not link.dummy
         ]

@@ -1,8 +1,5 @@
 """Many fencing worlds stepped together."""
 
-# pyright: basic
-# (mujoco's bindings carry no types)
-
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path

@@ -4,9 +4,6 @@ Only what moves or touches is in the physics model; looks are added by ``visuals
 somebody looks, so that a training batch never pays for them.
 """
 
-# pyright: basic
-# (mujoco's bindings carry no types)
-
 import math
 from typing import Final
 

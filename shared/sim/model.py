@@ -1,8 +1,5 @@
 """The fencing scene, compiled once and shared by every world that is stepped or drawn."""
 
-# pyright: basic
-# (mujoco's bindings carry no types)
-
 import hashlib
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,7 +12,7 @@ import numpy as np
 from shared.errors import ConfigError
 from shared.sim.arm import Float64
 from shared.sim.build import AGENTS, BASE_YAW, base_position, build_spec
-from shared.sim.config import SimConfig, Side
+from shared.sim.config import Side, SimConfig
 from shared.sim.parameters import ModelParameters, load_parameters
 from shared.sim.visuals import Shape, add_visuals, shapes_of
 
@@ -102,7 +99,7 @@ class FencingModel:
     def scene(self) -> mujoco.MjModel:
         """The same bodies and joints with something to look at; never stepped."""
         spec = build_spec(self.cfg, self.parameters)
-        add_visuals(spec, self.cfg, self.parameters)
+        add_visuals(spec, self.cfg)
         return spec.compile()
 
     @cached_property

@@ -4,9 +4,6 @@ Copying every state of every step would cost a percent of the physics. So only t
 kept, and a state every 100 steps: the physics is deterministic, the steps between are repeated.
 """
 
-# pyright: basic
-# (mujoco's bindings carry no types)
-
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -83,7 +80,8 @@ class NanGuard:
         if not warnings.any() and np.isfinite(self._state).all():
             return
         counts = warnings[:, :, 1]
-        bad = counts.any(axis=1) | ~np.isfinite(self._state).all(axis=1)
+        finite = np.isfinite(self._state).all(axis=1)
+        bad = np.logical_or(counts.any(axis=1), np.logical_not(finite))
         world = int(np.flatnonzero(bad)[0])
         kinds = list(mujoco.mjtWarning.__members__)
         said = [kinds[kind].removeprefix("mjWARN_") for kind in np.flatnonzero(counts[world])]
@@ -100,7 +98,12 @@ class NanGuard:
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / f"diverged-step{self._calls}-world{world}.npz"
         states = self._replay(world)
-        np.savez(path, **{name: np.array([state[name] for state in states]) for name in _FIELDS})
+        time, qpos, qvel, act, warmstart, ctrl = (
+            np.array([state[name] for state in states]) for name in _FIELDS
+        )
+        np.savez(
+            path, time=time, qpos=qpos, qvel=qvel, act=act, qacc_warmstart=warmstart, ctrl=ctrl
+        )
         path.with_suffix(".xml").write_text(self._xml(), encoding="utf-8")
         return path
 
