@@ -150,6 +150,11 @@ class Supervisor:
         """Return how often each was started again."""
         return {child.spec.name: child.restarts for child in self._children}
 
+    @property
+    def is_needed(self) -> bool:
+        """Return whether any process runs or is about to be started again."""
+        return any(child.popen or child.restart_at is not None for child in self._children)
+
     def start(self) -> list[ProcessEvent]:
         """Start all of them, in order.
 

@@ -21,7 +21,7 @@ Table = dict[str, Any]
 
 SECTIONS = (
     "bus", "sim", "game", "action", "reward",
-    "router", "actor", "learner", "league", "recorder", "train",
+    "site", "router", "actor", "learner", "league", "recorder", "train",
 )  # fmt: skip
 """Every section a site file may have; each service reads its own."""
 
@@ -161,7 +161,7 @@ def _explain(
     type: type[msgspec.Struct],
     overrides: Sequence[str],
 ) -> ConfigError:
-    message = str(error)
+    message = str(error).removeprefix(f"{section}.")
     keys: list[str] = []
     if at := _AT.search(message):
         keys = [key for key in re.sub(r"\[.*", "", at["path"]).split(".") if key]

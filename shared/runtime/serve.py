@@ -21,6 +21,7 @@ import msgspec
 import structlog
 
 from shared.bus.base import Bus
+from shared.bus.keys import check_chunk
 from shared.clock import Clock, SystemClock
 from shared.config.site import load_section
 from shared.errors import BusError, RiposteError
@@ -76,7 +77,8 @@ OpenBus = Callable[[ServeArgs, Clock], Bus]
 
 def run_id_of(folder: Path) -> str:
     """Return the name of a run on the bus: its folder's name, in letters a key may have."""
-    return re.sub(r"[^A-Za-z0-9._-]+", "-", folder.resolve().name).strip("-.") or "run"
+    plain = re.sub(r"[^A-Za-z0-9._-]+", "-", folder.resolve().name).strip("-._")
+    return plain[:64] or "run"
 
 
 def parse_args(role: str, argv: Sequence[str]) -> ServeArgs:
@@ -111,6 +113,11 @@ def parse_args(role: str, argv: Sequence[str]) -> ServeArgs:
         help="over the site file; may be repeated",
     )
     found = parser.parse_args(argv)
+    try:
+        check_chunk("--name", found.name)
+        check_chunk("--run-id", found.run_id or "run")
+    except ValueError as error:
+        parser.error(str(error))
     return ServeArgs(
         role=role,
         site=found.site,
