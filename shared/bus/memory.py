@@ -8,17 +8,16 @@ answers in the same order.
 import dataclasses
 import hashlib
 from collections.abc import Mapping
-from typing import Any, Generic, TypeVar
+from typing import Any, TypeVar
 
 from shared.bus.base import NoAnswer, Refused
 from shared.bus.counters import Counters
+from shared.bus.endpoints import Answer, Host, Requests, Values, too_long
 from shared.bus.keys import check_chunk, key_of, matches, pattern_of
-from shared.bus.queues import Fifo, Newest
 from shared.clock import Clock
-from shared.errors import MessageError
 from shared.messages.message import Message
 from shared.messages.topics import Qos, Service, Topic
-from shared.messages.wire import decode, encode
+from shared.messages.wire import encode
 
 In = TypeVar("In", bound=Message)
 Out = TypeVar("Out", bound=Message)
@@ -26,7 +25,7 @@ Out = TypeVar("Out", bound=Message)
 
 @dataclasses.dataclass(frozen=True)
 class _Value:
-    """A value under way."""
+    """A published value."""
 
     key: str
     boot: str
@@ -75,72 +74,79 @@ class MemoryBus:
     def __init__(self, hub: MemoryHub, name: str, boot: str) -> None:
         self.name = name
         self.boot = boot
-        self.counts = Counters()
-        self.subscriptions: list[_Subscription[Any]] = []
-        self.inboxes: list[_Inbox[Any, Any]] = []
+        self.subscriptions: list[Values[Any]] = []
+        self.inboxes: list[Requests[Any, Any]] = []
         self.roles: set[str] = set()
-        self.is_closed = False
+        self.open_paths: dict[_Path, None] = {}
+        """Ways back to askers that have no answer from this bus yet."""
+        self._counts = Counters()
+        self._host = Host(hub.clock, self._counts, self._wake, hub.max_messages, hub.max_bytes)
         self._hub = hub
         self._published = 0
         self._news = False
+        self._is_closed = False
 
     @property
     def counters(self) -> Mapping[str, int]:
         """Return counts since the start."""
-        return self.counts.read()
+        return self._counts.read()
 
     def publish(self, topic: Topic[Out], message: Out, **fields: str) -> None:
         """Give a value to every subscription; keep a LATEST one for those that come later."""
         key = key_of(topic.key, fields)
         payload = encode(message)
         if len(payload) > topic.max_bytes:
-            self.counts.add("refused_messages")
+            self._counts.add("refused_messages")
             return
-        if self.is_closed:
+        if self._is_closed:
             return
         value = _Value(key, self.boot, self._published, payload)
         self._published += 1
-        self.counts.sent(len(payload))
+        self._counts.sent(len(payload))
         if topic.qos is Qos.LATEST:
             self._hub.latest[key] = value
         for bus in self._hub.buses:
             for subscription in bus.subscriptions:
-                subscription.offer(value)
+                _offer(subscription, value)
 
-    def subscribe(self, topic: Topic[Out], **fields: str) -> "_Subscription[Out]":
+    def subscribe(self, topic: Topic[Out], **fields: str) -> Values[Out]:
         """Listen; a LATEST topic's present values are there at once."""
-        subscription = _Subscription(self, self._hub, topic, pattern_of(topic.key, fields))
+        pattern = pattern_of(topic.key, fields)
+        subscription = Values(self._host, topic, pattern, self._unsubscribe)
         self.subscriptions.append(subscription)
         for value in self._hub.latest.values():
-            subscription.offer(value)
+            _offer(subscription, value)
         return subscription
 
-    def answer(self, service: Service[In, Out], **fields: str) -> "_Inbox[In, Out]":
+    def answer(self, service: Service[In, Out], **fields: str) -> Requests[In, Out]:
         """Offer a service."""
-        inbox = _Inbox(self, self._hub, service, key_of(service.key, fields))
+        inbox = Requests(self._host, service, key_of(service.key, fields), self._unanswer)
         self.inboxes.append(inbox)
         return inbox
 
     def ask(
         self, service: Service[In, Out], message: In, timeout: float, **fields: str
-    ) -> "_Pending[Out]":
+    ) -> Answer[Out]:
         """Put a request into the inbox of the answerer that came first."""
         key = key_of(service.key, fields)
         payload = encode(message)
-        deadline = self._hub.clock.now() + timeout
-        pending = _Pending(self, self._hub.clock, service, key, timeout, deadline)
-        self.counts.add("asks")
+        answer = Answer(self._host, service, key, timeout)
+        self._counts.add("asks")
         if len(payload) > service.max_bytes:
-            self.counts.add("refused_messages")
-            pending.settle(Refused(too_long(len(payload), key, service.max_bytes)))
-            return pending
-        inboxes = [i for bus in self._hub.buses for i in bus.inboxes if i.key == key]
-        if not inboxes or self.is_closed:
-            pending.settle(NoAnswer(f"nobody answers {key}"))
-            return pending
-        self.counts.sent(len(payload))
-        inboxes[0].offer(pending, payload)
-        return pending
+            self._counts.add("refused_messages")
+            answer.on_arrival(Refused(too_long(len(payload), key, service.max_bytes)))
+            return answer
+        offers = ((bus, inbox) for bus in self._hub.buses for inbox in bus.inboxes)
+        found = next(((bus, inbox) for bus, inbox in offers if inbox.key == key), None)
+        if found is None or self._is_closed:
+            answer.on_end()
+            return answer
+        bus, inbox = found
+        self._counts.sent(len(payload))
+        path = _Path(bus, answer)
+        bus.open_paths[path] = None
+        inbox.offer(payload, path)
+        return answer
 
     def declare_alive(self, role: str) -> None:
         """Let others see this bus until it is closed."""
@@ -158,181 +164,52 @@ class MemoryBus:
         return news
 
     def close(self) -> None:
-        """Leave; requests that this bus has not answered end without one."""
-        if self.is_closed:
+        """Leave; requests that this bus has not answered end without an answer."""
+        if self._is_closed:
             return
-        self.is_closed = True
+        self._is_closed = True
         self._hub.buses.remove(self)
-        for inbox in list(self.inboxes):
-            inbox.close()
+        for path in list(self.open_paths):
+            path.drop()
+        self.inboxes.clear()
         self.subscriptions.clear()
         latest = self._hub.latest
         for key in [key for key, value in latest.items() if value.boot == self.boot]:
             del latest[key]
 
-    def wake(self) -> None:
-        """Make the next ``wait`` return true."""
+    def _wake(self) -> None:
         self._news = True
 
+    def _unsubscribe(self, subscription: Values[Any]) -> None:
+        if subscription in self.subscriptions:
+            self.subscriptions.remove(subscription)
 
-class _Subscription(Generic[Out]):
-    def __init__(self, bus: MemoryBus, hub: MemoryHub, topic: Topic[Out], pattern: str) -> None:
+    def _unanswer(self, inbox: Requests[Any, Any]) -> None:
+        if inbox in self.inboxes:
+            self.inboxes.remove(inbox)
+
+
+class _Path:
+    """The way back to an asker on the same hub."""
+
+    def __init__(self, bus: MemoryBus, answer: Answer[Any]) -> None:
         self._bus = bus
-        self._topic = topic
-        self._pattern = pattern
-        self._newest = Newest[_Value]() if topic.qos is Qos.LATEST else None
-        self._fifo = Fifo[_Value](hub.max_messages, hub.max_bytes)
+        self._answer = answer
 
-    def offer(self, value: _Value) -> None:
-        if not matches(self._pattern, value.key):
-            return
-        if self._newest is None:
-            dropped = self._fifo.push(value, len(value.payload))
-            self._bus.counts.add("dropped_values", dropped)
-        elif not self._newest.offer(value.key, value.boot, value.count, value):
-            return
-        self._bus.wake()
+    def reply(self, payload: bytes) -> None:
+        self._end(payload)
 
-    def take(self) -> Out | None:
-        queue = self._newest or self._fifo
-        while (value := queue.pop()) is not None:
-            try:
-                message = decode(self._topic.message, value.payload, self._topic.max_bytes)
-            except MessageError:
-                self._bus.counts.add("refused_messages")
-                continue
-            self._bus.counts.taken(len(value.payload))
-            return message
-        return None
+    def refuse(self, refusal: Refused) -> None:
+        self._end(refusal)
 
-    def close(self) -> None:
-        if self in self._bus.subscriptions:
-            self._bus.subscriptions.remove(self)
+    def drop(self) -> None:
+        self._end(NoAnswer(f"{self._bus.name} left without an answer"))
+
+    def _end(self, outcome: Refused | NoAnswer | bytes) -> None:
+        if self._bus.open_paths.pop(self, self) is None:
+            self._answer.on_arrival(outcome)
 
 
-class _Pending(Generic[Out]):
-    def __init__(
-        self, bus: MemoryBus, clock: Clock, service: Service[Any, Out], key: str,
-        timeout: float, deadline: float,
-    ) -> None:  # fmt: skip
-        self._bus = bus
-        self._clock = clock
-        self._service = service
-        self._key = key
-        self._timeout = timeout
-        self._deadline = deadline
-        self._result: Out | Refused | NoAnswer | None = None
-
-    def settle(self, result: Out | Refused | NoAnswer) -> None:
-        """Decide the outcome, unless it is decided."""
-        if self._result is not None or self._expired():
-            return
-        if isinstance(result, NoAnswer):
-            self._bus.counts.add("asks_unanswered")
-        self._result = result
-        self._bus.wake()
-
-    def settle_payload(self, payload: bytes) -> None:
-        """Decide the outcome by an answer's bytes."""
-        if self._result is not None or self._expired():
-            return
-        try:
-            answer = decode(self._service.reply, payload, self._service.max_reply_bytes)
-        except MessageError as error:
-            self._bus.counts.add("refused_messages")
-            self.settle(Refused(str(error)))
-            return
-        self._bus.counts.taken(len(payload))
-        self.settle(answer)
-
-    def take(self) -> Out | Refused | NoAnswer | None:
-        if self._result is None:
-            self._expired()
-        return self._result
-
-    def _expired(self) -> bool:
-        if self._result is None and self._clock.now() >= self._deadline:
-            self._bus.counts.add("asks_unanswered")
-            self._result = NoAnswer(f"no answer from {self._key} within {self._timeout:g} s")
-        return self._result is not None
-
-
-class _Inbox(Generic[In, Out]):
-    def __init__(self, bus: MemoryBus, hub: MemoryHub, service: Service[In, Out], key: str) -> None:
-        self.key = key
-        self._bus = bus
-        self._service = service
-        self._waiting = Fifo[tuple[_Pending[Out], bytes]](hub.max_messages, hub.max_bytes)
-        self._open: dict[int, _Pending[Out]] = {}
-
-    def offer(self, pending: _Pending[Out], payload: bytes) -> None:
-        if not self._waiting.offer((pending, payload), len(payload)):
-            self._bus.counts.add("refused_requests")
-            pending.settle(Refused(inbox_full(self.key), retry=True))
-            return
-        self._open[id(pending)] = pending
-        self._bus.wake()
-
-    def take(self) -> "_Request[In, Out] | None":
-        while (item := self._waiting.pop()) is not None:
-            pending, payload = item
-            try:
-                message = decode(self._service.request, payload, self._service.max_bytes)
-            except MessageError as error:
-                self._bus.counts.add("refused_messages")
-                self.settled(pending)
-                pending.settle(Refused(str(error)))
-                continue
-            self._bus.counts.taken(len(payload))
-            return _Request(self, self._bus, self._service, pending, message)
-        return None
-
-    def settled(self, pending: _Pending[Out]) -> None:
-        """Forget a request that has its answer."""
-        self._open.pop(id(pending), None)
-
-    def close(self) -> None:
-        if self in self._bus.inboxes:
-            self._bus.inboxes.remove(self)
-        for pending in self._open.values():
-            pending.settle(NoAnswer(f"{self._bus.name}, which answered {self.key}, has left"))
-        self._open.clear()
-
-
-class _Request(Generic[In, Out]):
-    def __init__(
-        self, inbox: _Inbox[In, Out], bus: MemoryBus, service: Service[In, Out],
-        pending: _Pending[Out], message: In,
-    ) -> None:  # fmt: skip
-        self._inbox = inbox
-        self._bus = bus
-        self._service = service
-        self._pending = pending
-        self._message = message
-
-    @property
-    def message(self) -> In:
-        return self._message
-
-    def reply(self, message: Out) -> None:
-        payload = encode(message)
-        if len(payload) > self._service.max_reply_bytes:
-            limit = self._service.max_reply_bytes
-            raise ValueError(too_long(len(payload), self._inbox.key, limit))
-        self._bus.counts.sent(len(payload))
-        self._inbox.settled(self._pending)
-        self._pending.settle_payload(payload)
-
-    def refuse(self, reason: str, *, retry: bool = False) -> None:
-        self._inbox.settled(self._pending)
-        self._pending.settle(Refused(reason, retry=retry))
-
-
-def too_long(size: int, key: str, limit: int) -> str:
-    """Return why a payload is not sent."""
-    return f"a message of {size} B on {key} is over its limit of {limit} B"
-
-
-def inbox_full(key: str) -> str:
-    """Return why a request is turned away for now."""
-    return f"too many requests wait on {key}; ask again later"
+def _offer(subscription: Values[Any], value: _Value) -> None:
+    if matches(subscription.pattern, value.key):
+        subscription.offer(value.key, value.boot, value.count, value.payload)

@@ -1,0 +1,129 @@
+"""The ``[bus]`` section of a site file, and what it means to Zenoh."""
+
+import json
+import re
+from typing import Any
+
+import msgspec
+
+from shared.messages.topics import MIB, SERVICES, TOPICS
+
+MAX_MESSAGE = max(
+    *(topic.max_bytes for topic in TOPICS),
+    *(max(service.max_bytes, service.max_reply_bytes) for service in SERVICES),
+) + MIB  # fmt: skip
+"""Nothing longer leaves the network layer (bytes)."""
+
+_ENDPOINT = re.compile(r"(tcp|tls|quic|ws)/(\[[0-9a-fA-F:.]+\]|[^:/\[\]]+):[0-9]{1,5}")
+
+
+class BusConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How the processes of a site reach each other."""
+
+    connect: tuple[str, ...] = ()
+    """Endpoints of routers, tried in order; empty: those of ``listen``."""
+    listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
+    """Where this site's router listens; only itself by default."""
+    open_seconds: float = 10.0
+    """How long a process waits for a router when it starts."""
+    watchdog_seconds: float = 5.0
+    """Without a router for so long, the session is opened anew."""
+    give_up_seconds: float = 60.0
+    """Without a router for so long, the process exits for its supervisor to restart it."""
+    lease_seconds: float = 2.0
+    """A silent link is given up after this; a dead process is noticed at once."""
+    block_seconds: float = 2.0
+    """Longest time a send may wait for a congested link."""
+    resend_seconds: float = 1.0
+    """Period in which LATEST values are sent again."""
+    inbox_messages: int = 64
+    """Requests that may wait in one inbox, values in one STREAM subscription."""
+    inbox_mib: int = 64
+    """The same, in MiB."""
+    shared_memory: bool = True
+    """Pass large messages between processes of one machine through /dev/shm."""
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        for name in ("connect", "listen"):
+            for endpoint in getattr(self, name):
+                if not _ENDPOINT.fullmatch(endpoint):
+                    raise ValueError(
+                        f"{name} has {endpoint!r}, expected an endpoint such as tcp/127.0.0.1:7447"
+                    )
+        if not self.connect and not self.listen:
+            raise ValueError("connect and listen are both empty: give an endpoint to one of them")
+        for name in (
+            "open_seconds", "watchdog_seconds", "give_up_seconds", "lease_seconds",
+            "block_seconds", "resend_seconds",
+        ):  # fmt: skip
+            value = getattr(self, name)
+            if not 0.1 <= value <= 3600:
+                raise ValueError(f"{name} ({value} s) must be between 0.1 and 3600")
+        if self.give_up_seconds < self.watchdog_seconds:
+            raise ValueError(
+                f"give_up_seconds ({self.give_up_seconds}) must be at least "
+                f"watchdog_seconds ({self.watchdog_seconds})"
+            )
+        for name in ("inbox_messages", "inbox_mib"):
+            value = getattr(self, name)
+            if not 1 <= value <= 65536:
+                raise ValueError(f"{name} ({value}) must be between 1 and 65536")
+
+    @property
+    def routers(self) -> tuple[str, ...]:
+        """Return the endpoints a client connects to."""
+        return self.connect or self.listen
+
+
+def client_json(cfg: BusConfig) -> str:
+    """Return Zenoh's configuration of a client: no scouting, no open socket."""
+    return json.dumps({
+        "mode": "client",
+        "connect": {
+            "endpoints": list(cfg.routers),
+            "timeout_ms": 500,
+            "exit_on_failure": True,
+            "retry": {
+                "period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5,
+            },
+        },
+        "listen": {"endpoints": []},
+        **_common(cfg),
+    })  # fmt: skip
+
+
+def router_json(cfg: BusConfig) -> str:
+    """Return Zenoh's configuration of a router."""
+    config: dict[str, Any] = {
+        "mode": "router",
+        "connect": {"endpoints": list(cfg.connect)},
+        "listen": {"endpoints": list(cfg.listen), "exit_on_failure": True, "timeout_ms": 0},
+        **_common(cfg),
+    }
+    config["transport"]["unicast"] = {
+        "max_sessions": 5000, "accept_pending": 1000, "accept_timeout": 2000,
+    }  # fmt: skip
+    return json.dumps(config)
+
+
+def _common(cfg: BusConfig) -> dict[str, Any]:
+    return {
+        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        "adminspace": {"enabled": False},
+        "transport": {
+            "link": {
+                "rx": {"max_message_size": MAX_MESSAGE, "buffer_size": 4 * MIB},
+                "tx": {
+                    "lease": round(cfg.lease_seconds * 1000),
+                    "queue": {
+                        "size": {"data": 16, "data_high": 16},
+                        "congestion_control": {
+                            "block": {"wait_before_close": round(cfg.block_seconds * 1e6)}
+                        },
+                    },
+                },
+            },
+            "shared_memory": {"enabled": cfg.shared_memory},
+        },
+    }

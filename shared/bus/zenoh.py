@@ -1,0 +1,449 @@
+# pyright: basic
+"""The bus between processes, over Zenoh; the only door to that library.
+
+Every process is a Zenoh client of one router. The library's threads only put what arrives into
+bounded queues and set one event; everything else happens on the service's thread.
+
+==========  =====================================================================================
+LATEST      put, DROP, with ``boot:count`` attached; sent again every second
+STREAM      put, DROP
+REQUEST     query, BLOCK, to the answerer that matches best; an answer, an encoded ``Refused`` as
+            the error, or nothing
+liveliness  a token ``alive/<role>/<name>/<boot>``
+==========  =====================================================================================
+
+The client reconnects by itself within half a second of a router's return, but not always
+(1 in 80 after long cuts): a watchdog opens a new session when none was seen for long.
+"""
+
+import contextlib
+import secrets
+import threading
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol, TypeVar
+
+import structlog
+import zenoh
+from zenoh.handlers import Callback
+
+from shared.bus.base import NoAnswer, Refused
+from shared.bus.config import BusConfig, client_json, router_json
+from shared.bus.counters import Counters
+from shared.bus.endpoints import MAX_REFUSAL, Answer, Host, Present, Requests, Values, too_long
+from shared.bus.keys import check_chunk, key_of, pattern_of
+from shared.bus.reopening import Reopening
+from shared.clock import Clock
+from shared.errors import BusError, ConfigError, MessageError
+from shared.messages.message import Message
+from shared.messages.topics import Qos, Service, Topic
+from shared.messages.wire import decode, encode
+
+In = TypeVar("In", bound=Message)
+Out = TypeVar("Out", bound=Message)
+
+PREFIX = "riposte/v1"
+UPKEEP_SECONDS = 0.25
+CLOSE_SECONDS = 3.0
+"""Longest wait for a session to close; a thread that hangs in it is left behind."""
+
+log = structlog.get_logger()
+
+
+def open_zenoh(cfg: BusConfig, name: str, clock: Clock, run: str) -> "ZenohBus":
+    """Return a session on the bus, once a router has answered.
+
+    Args:
+        cfg: where the routers are.
+        name: of this process, unique in the run.
+        clock: a clock that moves by itself.
+        run: name of the run; processes of other runs are not seen.
+
+    Raises:
+        BusError: no router answered within ``cfg.open_seconds``.
+        ValueError: ``name`` or ``run`` cannot be part of a key.
+    """
+    check_chunk("name", name)
+    check_chunk("run", run)
+    zenoh.init_log_from_env_or("error")
+    endpoints = ", ".join(cfg.routers)
+    began_at = clock.now()
+    told = False
+    while True:
+        try:
+            return ZenohBus(cfg, name, clock, run, _open(client_json(cfg)))
+        except zenoh.ZError as error:
+            waited = clock.now() - began_at
+            if waited > cfg.open_seconds:
+                raise BusError(
+                    f"no router at {endpoints} within {cfg.open_seconds:g} s: start one with "
+                    "`riposte router`, or name another endpoint with --connect"
+                ) from error
+            if waited > 1.0 and not told:
+                told = True
+                log.info("router_awaited", endpoints=endpoints, deadline=cfg.open_seconds)
+            threading.Event().wait(0.1)
+
+
+class Router:
+    """A Zenoh router in this process."""
+
+    def __init__(self, session: zenoh.Session, endpoints: tuple[str, ...]) -> None:
+        self.endpoints = endpoints
+        self._session = session
+
+    @property
+    def num_sessions(self) -> int:
+        """Return how many processes are connected."""
+        return len(self._session.info.transports())
+
+    def close(self) -> None:
+        """Stop routing."""
+        _close(self._session)
+
+
+def open_router(cfg: BusConfig) -> Router:
+    """Return a running router on ``cfg.listen``.
+
+    Raises:
+        ConfigError: it cannot listen there.
+    """
+    if not cfg.listen:
+        raise ConfigError(
+            "[bus] listen is empty: a router needs an endpoint, as tcp/127.0.0.1:7447"
+        )
+    zenoh.init_log_from_env_or("off")
+    try:
+        return Router(_open(router_json(cfg)), cfg.listen)
+    except zenoh.ZError as error:
+        text = str(error)
+        where = ", ".join(cfg.listen)
+        if "in use" in text:
+            raise ConfigError(
+                f"cannot listen on {where}: the port is in use; stop the other router, "
+                "or give another endpoint with --listen"
+            ) from error
+        raise ConfigError(f"cannot listen on {where}: {text.split(' at /')[0]}") from error
+
+
+class _Declared(Protocol):
+    """Something a new session must declare again; returns the library's object."""
+
+    def __call__(self, session: zenoh.Session) -> Any: ...
+
+
+class ZenohBus:
+    """One process's session; made by ``open_zenoh``."""
+
+    def __init__(
+        self, cfg: BusConfig, name: str, clock: Clock, run: str, session: zenoh.Session
+    ) -> None:
+        self.name = name
+        self.boot = secrets.token_hex(8)
+        self._cfg = cfg
+        self._clock = clock
+        self._prefix = f"{PREFIX}/{run}/"
+        self._counts = Counters()
+        self._news = threading.Event()
+        self._host = Host(
+            clock, self._counts, self._news.set, cfg.inbox_messages, cfg.inbox_mib << 20
+        )
+        self._session: zenoh.Session | None = session
+        self._opening: Reopening[zenoh.Session] | None = None
+        self._declared: dict[object, tuple[_Declared, Any]] = {}
+        self._present: dict[str, Present] = {}
+        self._latest: dict[str, tuple[bytes, bytes, float]] = {}
+        self._published = 0
+        self._seen_at = clock.now()
+        self._upkeep_at = 0.0
+        self._is_closed = False
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """Return counts since the start."""
+        return self._counts.read()
+
+    def publish(self, topic: Topic[Out], message: Out, **fields: str) -> None:
+        """Send a value without waiting; a slow link drops it, and LATEST sends it again."""
+        key = self._prefix + key_of(topic.key, fields)
+        payload = encode(message)
+        if len(payload) > topic.max_bytes:
+            self._counts.add("refused_messages")
+            log.warning("value_refused", reason=too_long(len(payload), key, topic.max_bytes))
+            return
+        stamp = f"{self.boot}:{self._published}".encode()
+        self._published += 1
+        if topic.qos is Qos.LATEST:
+            self._latest[key] = (payload, stamp, self._clock.now())
+        self._put(key, payload, stamp, topic.qos)
+
+    def subscribe(self, topic: Topic[Out], **fields: str) -> Values[Out]:
+        """Listen; a LATEST topic's present values are there within a second."""
+        pattern = self._prefix + pattern_of(topic.key, fields)
+        values = Values(self._host, topic, pattern, self._undeclare)
+        callback = self._guard(lambda sample: _take_sample(values, sample))
+        self._declare(values, lambda session: session.declare_subscriber(pattern, callback))
+        return values
+
+    def answer(self, service: Service[In, Out], **fields: str) -> Requests[In, Out]:
+        """Offer a service."""
+        key = self._prefix + key_of(service.key, fields)
+        inbox = Requests(self._host, service, key, self._undeclare)
+        callback = self._guard(lambda query: _take_query(inbox, query))
+        self._declare(
+            inbox, lambda session: session.declare_queryable(key, callback, complete=True)
+        )
+        return inbox
+
+    def ask(
+        self, service: Service[In, Out], message: In, timeout: float, **fields: str
+    ) -> Answer[Out]:
+        """Send a request; a congested link may hold this up for ``block_seconds``."""
+        key = key_of(service.key, fields)
+        payload = encode(message)
+        answer = Answer(self._host, service, key, timeout)
+        self._counts.add("asks")
+        if len(payload) > service.max_bytes:
+            self._counts.add("refused_messages")
+            answer.on_arrival(Refused(too_long(len(payload), key, service.max_bytes)))
+            return answer
+        if self._session is None:
+            answer.on_arrival(NoAnswer(f"{self._without_router()} to carry {key}"))
+            return answer
+        callback = self._guard(lambda reply: _take_reply(answer, reply), answer.on_end)
+        try:
+            self._session.get(
+                self._prefix + key,
+                callback,
+                payload=payload,
+                timeout=timeout,
+                target=zenoh.QueryTarget.BEST_MATCHING,
+                consolidation=zenoh.ConsolidationMode.NONE,
+                congestion_control=zenoh.CongestionControl.BLOCK,
+                priority=zenoh.Priority.DATA,
+            )
+            self._counts.sent(len(payload))
+        except zenoh.ZError as error:
+            answer.on_arrival(NoAnswer(f"{key} cannot be asked: {error}"))
+        return answer
+
+    def declare_alive(self, role: str) -> None:
+        """Let others see this process for as long as its session lives."""
+        check_chunk("role", role)
+        token = f"{self._prefix}alive/{role}/{self.name}/{self.boot}"
+        if token not in self._declared:
+            self._declare(token, lambda session: session.liveliness().declare_token(token))
+
+    def alive(self, role: str) -> frozenset[str]:
+        """Return the names of living processes; complete a moment after the first call."""
+        present = self._present.get(role)
+        if present is None:
+            check_chunk("role", role)
+            present = self._present[role] = Present()
+            pattern = f"{self._prefix}alive/{role}/*/*"
+            callback = self._guard(lambda sample: _take_token(present, sample))
+            self._declare(
+                present,
+                lambda session: session.liveliness().declare_subscriber(
+                    pattern, callback, history=True
+                ),
+            )
+        return present.names()
+
+    def wait(self, timeout: float) -> bool:
+        """Wait until something new arrives, at most ``timeout`` seconds; do the upkeep.
+
+        Raises:
+            BusError: no router for ``give_up_seconds``.
+        """
+        deadline = self._clock.now() + timeout
+        while True:
+            now = self._clock.now()
+            if now >= self._upkeep_at:
+                self._upkeep_at = now + UPKEEP_SECONDS
+                self._keep_session(now)
+                self._resend(now)
+            if self._news.is_set():
+                self._news.clear()
+                return True
+            if now >= deadline:
+                return False
+            self._news.wait(min(deadline, self._upkeep_at) - now)
+
+    def close(self) -> None:
+        """Leave the bus, in ``CLOSE_SECONDS`` at most."""
+        self._is_closed = True
+        if self._opening is not None:
+            self._opening.cancel()
+        session, self._session = self._session, None
+        if session is not None:
+            _close(session)
+
+    def _guard(
+        self, take: Callable[[Any], None], end: Callable[[], None] | None = None
+    ) -> "Callback[Any]":
+        """Return a callback that says what went wrong; Zenoh would swallow it."""
+
+        def run(argument: Any) -> None:
+            try:
+                take(argument)
+            except MessageError as error:
+                self._counts.add("refused_messages")
+                log.warning("value_refused", reason=str(error))
+            except Exception:
+                log.exception("bus_callback_failed")
+
+        return Callback(run, end)
+
+    def _put(self, key: str, payload: bytes, stamp: bytes, qos: Qos) -> None:
+        if self._session is None:
+            return
+        latest = qos is Qos.LATEST
+        with contextlib.suppress(zenoh.ZError):  # the watchdog sees a closed session
+            self._session.put(
+                key,
+                payload,
+                attachment=stamp,
+                congestion_control=zenoh.CongestionControl.DROP,
+                priority=zenoh.Priority.DATA_HIGH if latest else zenoh.Priority.DATA_LOW,
+            )
+            self._counts.sent(len(payload))
+
+    def _resend(self, now: float) -> None:
+        for key, (payload, stamp, at) in self._latest.items():
+            if now - at >= self._cfg.resend_seconds - UPKEEP_SECONDS / 2:
+                self._latest[key] = (payload, stamp, now)
+                self._put(key, payload, stamp, Qos.LATEST)
+
+    def _declare(self, owner: object, declare: _Declared) -> None:
+        """Declare something now and in every later session, until its owner is closed."""
+        entity = None
+        if self._session is not None:
+            with contextlib.suppress(zenoh.ZError):  # a closed session: the watchdog's business
+                entity = declare(self._session)
+        self._declared[owner] = (declare, entity)
+
+    def _undeclare(self, owner: object) -> None:
+        _, entity = self._declared.pop(owner, (None, None))
+        if entity is not None:
+            with contextlib.suppress(zenoh.ZError):
+                entity.undeclare()
+
+    def _keep_session(self, now: float) -> None:
+        """Watch for a router; without one for long, open a new session, and at last give up."""
+        if self._is_closed:
+            return
+        if self._session is not None and self._session.info.routers_zid():
+            self._seen_at = now
+            return
+        if now - self._seen_at > self._cfg.give_up_seconds:
+            raise BusError(f"{self._without_router()}: giving up")
+        if self._opening is not None:
+            session = self._opening.take()
+            if session is not None:
+                self._opening = None
+                self._adopt(session, now)
+        elif now - self._seen_at > self._cfg.watchdog_seconds:
+            log.warning("session_reopened", reason=self._without_router())
+            session, self._session = self._session, None
+            self._opening = Reopening(session, lambda: _try_open(client_json(self._cfg)), _close)
+
+    def _adopt(self, session: zenoh.Session, now: float) -> None:
+        self._session = session
+        self._seen_at = now
+        self._counts.add("reconnects")
+        for present in self._present.values():
+            present.clear()
+        for owner, (declare, _) in list(self._declared.items()):
+            self._declare(owner, declare)
+        for key, (payload, stamp, _) in self._latest.items():
+            self._put(key, payload, stamp, Qos.LATEST)
+        self._news.set()
+        log.info("session_restored", routers=", ".join(self._cfg.routers))
+
+    def _without_router(self) -> str:
+        seconds = self._clock.now() - self._seen_at
+        return f"no router at {', '.join(self._cfg.routers)} for {seconds:.1f} s"
+
+
+class _Path:
+    """The way back to an asker: its query, which must be dropped to end."""
+
+    def __init__(self, query: zenoh.Query, key: str) -> None:
+        self._query = query
+        self._key = key
+
+    def reply(self, payload: bytes) -> None:
+        with contextlib.suppress(zenoh.ZError), self._query:  # the asker may have left
+            self._query.reply(self._key, payload)
+
+    def refuse(self, refusal: Refused) -> None:
+        with contextlib.suppress(zenoh.ZError), self._query:
+            self._query.reply_err(encode(refusal))
+
+    def drop(self) -> None:
+        self._query.drop()
+
+
+def _take_sample(values: Values[Any], sample: zenoh.Sample) -> None:
+    key = str(sample.key_expr)
+    size = len(sample.payload)
+    if size > values.max_bytes:
+        raise MessageError(too_long(size, key, values.max_bytes))
+    stamp = sample.attachment
+    if stamp is None or len(stamp) > 64:
+        raise MessageError(f"a value on {key} has no stamp")
+    boot, _, count = stamp.to_bytes().decode("ascii", "replace").partition(":")
+    if not (count.isascii() and count.isdigit()):
+        raise MessageError(f"a value on {key} has the stamp {boot!r}:{count!r}")
+    values.offer(key, boot, int(count), sample.payload.to_bytes())
+
+
+def _take_token(present: Present, sample: zenoh.Sample) -> None:
+    token = str(sample.key_expr)
+    present.on_token(token, token.split("/")[-2], sample.kind == zenoh.SampleKind.PUT)
+
+
+def _take_query(inbox: Requests[Any, Any], query: zenoh.Query) -> None:
+    path = _Path(query, inbox.key)
+    payload = query.payload
+    if payload is None:
+        path.refuse(Refused(f"a request on {inbox.key} has no payload"))
+    elif inbox.accepts(len(payload), path):
+        inbox.offer(payload.to_bytes(), path)
+
+
+def _take_reply(answer: Answer[Any], reply: zenoh.Reply) -> None:
+    if reply.ok is not None:
+        size = len(reply.ok.payload)
+        if size > answer.max_bytes:
+            answer.on_arrival(Refused(f"the answer is {size} B long, over {answer.max_bytes} B"))
+        else:
+            answer.on_arrival(reply.ok.payload.to_bytes())
+    elif reply.err is not None and len(reply.err.payload) <= MAX_REFUSAL:
+        # The library's own errors, such as a timeout, are text; the end that follows tells.
+        with contextlib.suppress(MessageError):
+            answer.on_arrival(decode(Refused, reply.err.payload.to_bytes(), MAX_REFUSAL))
+
+
+def _open(config: str) -> zenoh.Session:
+    return zenoh.open(zenoh.Config.from_json5(config))
+
+
+def _try_open(config: str) -> zenoh.Session | None:
+    with contextlib.suppress(zenoh.ZError):
+        return _open(config)
+    return None
+
+
+def _close(session: zenoh.Session) -> None:
+    """Close a session, at most ``CLOSE_SECONDS`` long."""
+
+    def close() -> None:
+        with contextlib.suppress(zenoh.ZError):
+            session.close()
+
+    thread = threading.Thread(target=close, name="bus-close", daemon=True)
+    thread.start()
+    thread.join(CLOSE_SECONDS)
+    if thread.is_alive():
+        log.warning("session_left_open", after_seconds=CLOSE_SECONDS)
