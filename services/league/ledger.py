@@ -226,7 +226,7 @@ def _check(connection: sqlite3.Connection, path: Path) -> None:
             f"ledger {path} has schema version {version}, this Riposte reads {SCHEMA_VERSION}; "
             "use the version of Riposte that made the run"
         )
-    findings = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
+    findings = " ".join(connection.execute("PRAGMA quick_check(1)").fetchone()[0].split())
     if findings != "ok":
         raise LedgerError(f"ledger {path} is damaged ({findings}); {_RESTORE}")
     count, last = connection.execute("SELECT count(*), max(seq) FROM events").fetchone()

@@ -130,7 +130,6 @@ class League:
         self._journal.begin()
         self._desk.advance()
         answers = self._take_requests()
-        self._desk.end_lapsed()
         did |= bool(answers or self._journal.uncommitted)
         if self._journal.commit():
             for request, answer in answers:
@@ -173,6 +172,7 @@ class League:
             if (receipt := self._enter_version(version)) is not None:
                 answers.append((version, receipt))
         answers += [(r, desk.renew(r.message)) for r in _take(self._renewals)]
+        desk.end_lapsed()  # after renewals that waited, before their work is granted again
         answers += [(r, desk.lease(r.message)) for r in _take(self._requests)]
         return answers
 
