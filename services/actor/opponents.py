@@ -9,7 +9,7 @@ from shared.messages.league import SnapshotReply, SnapshotRequest
 from shared.messages.topics import SNAPSHOT
 from shared.policy.mlp import GaussianPolicy
 from shared.policy.players import SCRIPTED_PREFIX, Player, SnapshotPlayer, scripted_player
-from shared.policy.snapshot import Fit, digest_of, unpack
+from shared.policy.snapshot import Fit, digest_of, reference_of, unpack
 
 RETRY_DELAY = 0.5
 """Seconds between a fetch that failed and the next."""
@@ -66,7 +66,7 @@ class Opponents:
         if pending is None:
             if self._clock.now() >= self._not_before.get(digest, float("-inf")):
                 self._pending[digest] = self._bus.ask(
-                    SNAPSHOT, SnapshotRequest(snapshot=digest), self._timeout
+                    SNAPSHOT, SnapshotRequest(snapshot=reference_of(digest)), self._timeout
                 )
             return
         answer = pending.take()

@@ -1,9 +1,11 @@
 """The actor: asks for a lease, plays it, hands rollouts and results over, asks again."""
 
 import dataclasses
+from typing import Any
 
 import msgspec
 import structlog
+from numpy.typing import NDArray
 
 from services.actor.collector import Collector, Evaluation, Results, Segment
 from services.actor.config import ActorConfig
@@ -21,7 +23,7 @@ from shared.messages.league import (
     LeaseRequest,
     LeaseStatus,
 )
-from shared.messages.topics import FRAMES, LEASE, POLICY, RENEWAL, RESULTS, ROLLOUT
+from shared.messages.topics import FRAMES, LEASE, POLICY, RENEWAL, RESULTS, ROLLOUT, SCHEDULE
 from shared.messages.training import AGENTS, Agent, PolicyAnnouncement, Receipt, Rollout
 from shared.policy.mlp import GaussianPolicy
 from shared.policy.players import Player
@@ -31,6 +33,8 @@ from shared.runtime.service import Health
 from shared.sim.env import FencingEnv
 
 log = structlog.get_logger()
+
+Arrays = dict[str, NDArray[Any]]
 
 LEASE_RETRY = 0.2
 """Seconds between two requests for work."""
@@ -94,6 +98,7 @@ class Actor:
             bus, RESULTS, clock, window=RESULTS_WINDOW, timeout=cfg.ask_timeout
         )
         self._policies = {agent: bus.subscribe(POLICY, agent=agent) for agent in AGENTS}
+        self._schedule = bus.subscribe(SCHEDULE)
         self._learning: dict[Agent, LearningPolicy] = {}
         self._frames = FrameSampler(env, clock, cfg.frame_period, cfg.frame_steps)
         self._lease: Lease | None = None
@@ -106,6 +111,9 @@ class Actor:
         self._expires_at = 0.0
         self._rollout_sequence = 0
         self._result_sequence = 0
+        self._resume: tuple[Arrays, dict[str, Any]] | None = None
+        self.paused = False
+        """Keep up with everybody, but play nothing (serial mode, around a cut)."""
         self._samples = Rate(clock)
         self._waiting = ""
         self._waiting_since = clock.now()
@@ -118,12 +126,18 @@ class Actor:
             "steps": 0,
         }
 
+    @property
+    def num_envs(self) -> int:
+        """Return how many bouts are played in parallel."""
+        return self._env.num_envs
+
     # -- the loop ---------------------------------------------------------------------------
 
     def tick(self) -> bool:
         """Do one piece of work: at most one rollout, or as many steps of an evaluation."""
         did = self._pump()
         did |= self._take_policies()
+        did |= self._take_schedule()
         if self._lease is None:
             return self._seek_lease() or did
         self._keep_lease()
@@ -131,7 +145,7 @@ class Actor:
             return True
         if self._collector is None and self._evaluation is None:
             return self._start() or did
-        return self._play() or did
+        return (not self.paused and self._play()) or did
 
     def _pump(self) -> bool:
         """Hand over what is due, and count what was answered."""
@@ -169,6 +183,18 @@ class Actor:
             while (announcement := subscription.take()) is not None:
                 did = True
                 self._learn_of(agent, announcement)
+        return did
+
+    def _take_schedule(self) -> bool:
+        """Leave a stage as soon as the league has, without waiting for the renewal to say so."""
+        did = False
+        while (schedule := self._schedule.take()) is not None:
+            did = True
+            played = self._lease.stage if self._lease else None
+            if played is not None and (
+                schedule.stage is None or schedule.stage.index > played.index
+            ):
+                self._drop_lease("stage over")
         return did
 
     def _learn_of(self, agent: Agent, announcement: PolicyAnnouncement) -> None:
@@ -285,6 +311,9 @@ class Actor:
             self._reward_cfg,
             lease.seed,
         )
+        if self._resume is not None:
+            self._collector.restore(*self._resume)
+            self._resume = None
         return True
 
     def _start_evaluation(self, lease: Lease) -> bool:
@@ -401,8 +430,6 @@ class Actor:
         if frames is not None:
             self._bus.publish(FRAMES, frames, name=self._bus.name)
 
-    # -- how it is --------------------------------------------------------------------------
-
     def _count_steps(self, steps: int) -> None:
         count = steps * self._env.num_envs
         self._counters["steps"] += count
@@ -414,11 +441,52 @@ class Actor:
             self._waiting_since = self._clock.now()
         self._waiting = what
 
+    # -- serial mode ------------------------------------------------------------------------
+
     @property
     def quiet(self) -> bool:
-        """Return whether nothing is under way between this actor and anybody."""
+        """Return whether nothing is under way between this actor and anybody, nor half done."""
         outboxes = (*self._rollouts.values(), self._results)
-        return not any(outbox.unacknowledged for outbox in outboxes) and not self._requested
+        return not (
+            any(outbox.unacknowledged for outbox in outboxes)
+            or self._requested
+            or self._renewing
+            or self._evaluation
+        )
+
+    @property
+    def ready(self) -> bool:
+        """Return whether it holds all it needs to play its lease, or has none."""
+        return self._lease is None or self._collector is not None
+
+    def state(self) -> tuple[Arrays, dict[str, Any]]:
+        """Return arrays and JSON values from which ``restore`` continues; only when ``quiet``."""
+        arrays: Arrays = {}
+        values: dict[str, Any] = {
+            "lease": msgspec.to_builtins(self._lease),
+            "rollout_sequence": self._rollout_sequence,
+            "result_sequence": self._result_sequence,
+            "ask_at": self._ask_at,
+            "renew_at": self._renew_at,
+            "expires_at": self._expires_at,
+            "collector": None,
+        }
+        if self._collector is not None:
+            arrays, values["collector"] = self._collector.state()
+        return arrays, values
+
+    def restore(self, arrays: Arrays, values: dict[str, Any]) -> None:
+        """Continue from what ``state`` returned, once the players of the lease are here again."""
+        self._lease = msgspec.convert(values["lease"], Lease | None)
+        self._rollout_sequence = int(values["rollout_sequence"])
+        self._result_sequence = int(values["result_sequence"])
+        self._ask_at = float(values["ask_at"])
+        self._renew_at = float(values["renew_at"])
+        self._expires_at = float(values["expires_at"])
+        if values["collector"] is not None:
+            self._resume = (arrays, values["collector"])
+
+    # -- how it is --------------------------------------------------------------------------
 
     def health(self) -> Health:
         """Return how this actor is."""

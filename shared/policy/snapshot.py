@@ -85,7 +85,7 @@ class Snapshot:
     @property
     def reference(self) -> str:
         """Return the player reference of this snapshot."""
-        return _REFERENCE_PREFIX + self.digest
+        return reference_of(self.digest)
 
     def check_fits(self, fit: Fit) -> None:
         """Refuse a snapshot made for something else.
@@ -113,6 +113,11 @@ class Snapshot:
 def normaliser_hash(obs_mean: NDArray[np.float32], obs_std: NDArray[np.float32]) -> str:
     """Return 16 hex digits that stand for a normaliser's numbers."""
     return schema_hash([obs_mean.astype("<f4").tobytes().hex(), obs_std.astype("<f4").tobytes().hex()])
+
+
+def reference_of(digest: str) -> str:
+    """Return the player reference of a content hash."""
+    return _REFERENCE_PREFIX + digest
 
 
 def digest_of(reference: str) -> str:

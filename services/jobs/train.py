@@ -1,0 +1,326 @@
+"""`riposte train`: phase one on this machine, from two fresh policies to a report.
+
+Starts router, league, two learners, recorder and actors, watches them, shows where the run
+stands, and ends with the report. ``--serial`` runs the same services in one process.
+"""
+
+import argparse
+import contextlib
+import datetime
+import json
+import os
+import socket
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import structlog
+
+from services.jobs.settings import BUDGETS, Settings, TrainConfig
+from services.supervisor import ProcessEvent, ProcessSpec, Supervisor, service_command
+from shared.bus.base import Bus
+from shared.bus.delivery import Outbox
+from shared.clock import SystemClock
+from shared.errors import ConfigError, RiposteError
+from shared.messages.league import Incident
+from shared.messages.topics import INCIDENT, SCHEDULE
+from shared.messages.training import AGENTS, Receipt
+from shared.runtime.files import RunLock, atomic_write, require_free_space
+from shared.runtime.logging import configure_logging
+from shared.runtime.process import THREAD_LIMITS
+from shared.runtime.serve import run_id_of, stop_on_signals
+
+if TYPE_CHECKING:
+    from services.jobs.dashboard import Dashboard
+
+__all__ = ["TrainConfig", "main"]
+
+log = structlog.get_logger()
+
+POLL_SECONDS = 0.1
+FREE_BYTES = 256 << 20
+"""A run needs this much disk to begin with."""
+EXIT_INTERRUPTED = 130
+
+
+class Stopped(Exception):
+    """The person at the terminal asked to stop."""
+
+
+def main(argv: Sequence[str]) -> int:
+    """Run one training job; return the exit code."""
+    found = _parse(argv)
+    overrides = _overrides(found)
+    folder, run = _folder(found)
+    settings = _settings(found, folder, overrides)
+    with RunLock(folder):
+        _check_folder(folder, resume=found.resume)
+        require_free_space(folder, FREE_BYTES)
+        atomic_write(folder / "config.toml", settings.to_toml().encode())
+        _point_latest_at(folder)
+        configure_logging(
+            folder / "logs" / "train.jsonl", bound={"service": "train", "run_id": run}
+        )
+        # A signal ends the loop below; the deadline is for processes that will not stop.
+        with stop_on_signals(deadline=180.0) as stop:
+            try:
+                if found.serial:
+                    _train_serially(settings, folder, run, found.resume, stop)
+                else:
+                    _train(settings, folder, run, stop)
+            except Stopped:
+                print(f"\nstopped; continue with: riposte train --resume --out {folder}")
+                return EXIT_INTERRUPTED
+        return _conclude(folder)
+
+
+def _parse(argv: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="riposte train", description="Train two fencers on this machine, with a report."
+    )
+    parser.add_argument("site", nargs="?", type=Path, metavar="SITE", help="site file (TOML)")
+    parser.add_argument(
+        "--phase", choices=("one",), default="one", help="which phase (%(default)s)"
+    )
+    parser.add_argument("--budget", choices=tuple(BUDGETS), help="how long (the site file's)")
+    parser.add_argument("--actors", type=int, metavar="N", help="actor processes")
+    parser.add_argument("--seed", type=int, metavar="S", help="of everything random")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the run")
+    parser.add_argument("--resume", action="store_true", help="continue the run in --out")
+    parser.add_argument("--serial", action="store_true", help="one process, same seed same bits")
+    parser.add_argument(
+        "--view", action="store_true", help="open the live view in a browser"
+    )
+    parser.add_argument(
+        "--set", action="append", default=[], dest="overrides", metavar="SECTION.KEY=VALUE",
+        help="over the site file; may be repeated",
+    )  # fmt: skip
+    return parser.parse_args(argv)
+
+
+def _overrides(found: argparse.Namespace) -> list[str]:
+    overrides = list(BUDGETS[found.budget]) if found.budget else []
+    if found.actors is not None:
+        overrides.append(f"train.actors={found.actors}")
+    if found.seed is not None:
+        overrides.append(f"train.seed={found.seed}")
+    return [*overrides, *found.overrides]
+
+
+def _folder(found: argparse.Namespace) -> tuple[Path, str]:
+    """Return the run's folder and its name on the bus."""
+    if found.out is not None:
+        folder: Path = found.out
+    elif found.resume:
+        folder = Path("runs/latest")
+        if not folder.exists():
+            raise ConfigError("there is no run to resume in runs/latest; name it with --out DIR")
+        folder = folder.resolve()
+    else:
+        stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
+        folder = Path("runs") / f"train-{stamp}"
+    return folder, run_id_of(folder)
+
+
+def _settings(found: argparse.Namespace, folder: Path, overrides: Sequence[str]) -> Settings:
+    """Return the settings: those the run began with when resuming, else site file and flags."""
+    saved = folder / "config.toml"
+    if found.resume and saved.exists():
+        if found.site is not None:
+            raise ConfigError(f"--resume continues with {saved}; leave the site file out")
+        return Settings.load(saved, overrides)
+    return Settings.load(found.site, overrides)
+
+
+def _check_folder(folder: Path, *, resume: bool) -> None:
+    """Refuse to mix two runs.
+
+    Raises:
+        ConfigError: there is a run and ``resume`` is not asked for, or the other way round.
+    """
+    has_run = (folder / "league.sqlite").exists()
+    if has_run and not resume:
+        raise ConfigError(
+            f"{folder} holds a run already; continue it with --resume, or choose another --out"
+        )
+    if resume and not has_run:
+        raise ConfigError(f"{folder} holds no run to resume; leave --resume out to start one")
+
+
+def _point_latest_at(folder: Path) -> None:
+    """Let ``runs/latest`` be this run, when it lies in ``runs``."""
+    if folder.parent.name != "runs":
+        return
+    link = folder.parent / "latest"
+    with contextlib.suppress(OSError):
+        if link.is_symlink() or not link.exists():
+            temporary = link.with_name(f".latest.{os.getpid()}")
+            temporary.symlink_to(folder.name)
+            temporary.replace(link)
+
+
+def _conclude(folder: Path) -> int:
+    """Write the report and print what a person wants to know."""
+    from services.jobs.report import summary_text, write_report
+
+    summary = write_report(folder)
+    print(summary_text(summary))
+    return 0
+
+
+# -- many processes ---------------------------------------------------------------------------
+
+
+def free_port() -> int:
+    """Return a TCP port of the loopback that nobody listens on now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def processes(settings: Settings, folder: Path, run: str, endpoint: str) -> list[ProcessSpec]:
+    """Return the processes of a run on this machine, in the order they are started."""
+
+    def spec(role: str, name: str, **more: str) -> ProcessSpec:
+        command = service_command(
+            role, name=name, run=folder, site=folder / "config.toml", run_id=run,
+            connect=() if role == "router" else (endpoint,), **more,
+        )  # fmt: skip
+        extra = ("--listen", endpoint) if role == "router" else ()
+        return ProcessSpec(name, (*command, *extra))
+
+    made = [spec("router", "router-0"), spec("league", "league-0")]
+    # The antagonist learns first: its long imports begin first.
+    made += [spec("learner", f"learner-{agent}", agent=agent) for agent in AGENTS]
+    made += [spec("actor", f"actor-{index}") for index in range(settings.train.actors)]
+    if settings.train.record:
+        made.append(spec("recorder", "recorder-0"))
+    return made
+
+
+def _train(settings: Settings, folder: Path, run: str, stop: threading.Event) -> None:
+    """Run the processes until the schedule is done."""
+    from shared.bus.zenoh import open_zenoh
+
+    clock = SystemClock()
+    listen = settings.bus.listen[0] if settings.bus.connect else ""
+    endpoint = listen or f"tcp/127.0.0.1:{free_port()}"
+    atomic_write(
+        folder / "endpoint.json", json.dumps({"connect": endpoint, "run": run}).encode()
+    )
+    supervisor = Supervisor(processes(settings, folder, run, endpoint), folder / "logs", clock)
+    try:
+        started = supervisor.start()
+        from msgspec.structs import replace
+
+        bus_cfg = replace(settings.bus, connect=(endpoint,))
+        with (
+            contextlib.closing(open_zenoh(bus_cfg, "train", clock, run)) as bus,
+            _dashboard(bus, clock, folder) as dashboard,
+        ):
+            watcher = _Watcher(bus, clock, supervisor, dashboard)
+            watcher.tell(started)
+            while not watcher.finished:
+                if stop.is_set():
+                    raise Stopped
+                watcher.tick()
+                bus.wait(POLL_SECONDS)
+    finally:
+        for event in supervisor.stop():
+            log.info("process_stopped", process=event.name, exit_code=event.exit_code)
+        (folder / "endpoint.json").unlink(missing_ok=True)
+
+
+class _Watcher:
+    """Follows a run: its schedule, its processes, what the report should mention."""
+
+    def __init__(
+        self, bus: Bus, clock: SystemClock, supervisor: Supervisor, dashboard: "Dashboard"
+    ) -> None:
+        self._bus = bus
+        self._clock = clock
+        self._supervisor = supervisor
+        self._dashboard = dashboard
+        self._schedule = bus.subscribe(SCHEDULE)
+        self._incidents: Outbox[Incident, Receipt] = Outbox(
+            bus, INCIDENT, clock, window=256, timeout=5.0
+        )
+        self._sequence = 0
+        self.finished = False
+
+    def tick(self) -> None:
+        """Do one round.
+
+        Raises:
+            RiposteError: a process was given up; the run can be resumed.
+        """
+        self.tell(self._supervisor.poll())
+        self._incidents.pump()
+        while (schedule := self._schedule.take()) is not None:
+            self.finished = schedule.finished
+        self._dashboard.tick(self._supervisor.restarts)
+
+    def tell(self, events: Sequence[ProcessEvent]) -> None:
+        """Log what happened to processes, and have the report mention what should not have."""
+        for event in events:
+            log.info(
+                f"process_{event.kind}", process=event.name, pid=event.pid,
+                exit_code=event.exit_code,
+            )  # fmt: skip
+            if event.kind in ("died", "restarted", "gave_up"):
+                self._note(event)
+                self._dashboard.say(event.describe)
+            if event.kind == "gave_up":
+                raise RiposteError(f"{event.describe}\n{event.tail}".rstrip())
+
+    def _note(self, event: ProcessEvent) -> None:
+        if self._incidents.full:
+            return
+        self._incidents.put(
+            Incident(
+                source="train",
+                boot=self._bus.boot,
+                sequence=self._sequence,
+                kind=f"process_{event.kind}",
+                detail=event.describe[:2000],
+                at_ns=self._clock.wall_ns(),
+            )
+        )
+        self._sequence += 1
+
+
+@contextlib.contextmanager
+def _dashboard(bus: Bus, clock: SystemClock, folder: Path) -> "Iterator[Dashboard]":
+    """Show where the run stands for as long as the block lasts."""
+    from services.jobs.dashboard import Dashboard
+
+    with Dashboard(bus, clock, folder) as dashboard:
+        yield dashboard
+
+
+# -- one process ------------------------------------------------------------------------------
+
+
+def _train_serially(
+    settings: Settings, folder: Path, run: str, resume: bool, stop: threading.Event
+) -> None:
+    """Run everything in this process until the schedule is done."""
+    os.environ.update(THREAD_LIMITS)
+    from services.jobs.serial import SerialRun
+
+    with contextlib.closing(
+        SerialRun(settings, folder, run, resume=resume, record=settings.train.record)
+    ) as serial:
+        bus = serial.join("train")
+        with _dashboard(bus, SystemClock(), folder) as dashboard:
+            while not serial.finished:
+                if stop.is_set():
+                    raise Stopped
+                serial.tick()
+                dashboard.tick({})
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
