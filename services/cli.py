@@ -72,6 +72,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(command: Command, argv: Sequence[str]) -> int:
     try:
+        if command in JOBS:
+            from shared.runtime.logging import configure_logging
+
+            configure_logging(None)  # services and long jobs add their log file
         entry: Callable[[Sequence[str]], int] = importlib.import_module(command.module).main
         return entry(argv)
     except RiposteError as error:

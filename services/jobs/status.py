@@ -20,6 +20,8 @@ from shared.runtime.serve import ServeArgs, open_site_bus, run_id_of
 
 LISTEN_SECONDS = 1.5
 """Every process reports once a second."""
+OPEN_SECONDS = 3.0
+"""A person waits for the answer."""
 EXIT_NOBODY = 1
 
 
@@ -78,6 +80,7 @@ def bus_args(found: argparse.Namespace, role: str) -> ServeArgs:
         run=found.run,
         run_id=run_id or run_id_of(found.run),
         connect=connect,
+        overrides=(f"bus.open_seconds={OPEN_SECONDS}",),
     )
 
 

@@ -24,7 +24,7 @@ from shared.bus.base import Bus
 from shared.bus.keys import check_chunk
 from shared.clock import Clock, SystemClock
 from shared.config.site import load_section
-from shared.errors import BusError, RiposteError
+from shared.errors import BusError, ConfigError, RiposteError
 from shared.messages.training import Agent
 from shared.runtime.build import commit
 from shared.runtime.logging import configure_logging
@@ -131,13 +131,21 @@ def parse_args(role: str, argv: Sequence[str]) -> ServeArgs:
 
 
 def open_site_bus(args: ServeArgs, clock: Clock) -> Bus:
-    """Return a session on the bus of ``args``."""
+    """Return a session on the bus of ``args``.
+
+    Raises:
+        BusError: no router answers.
+        ConfigError: the bus's section or an endpoint is wrong.
+    """
     from shared.bus.config import BusConfig  # the session and its library: only where one is opened
     from shared.bus.zenoh import open_zenoh
 
     cfg = args.section("bus", BusConfig)
     if args.connect:
-        cfg = msgspec.structs.replace(cfg, connect=args.connect)
+        try:
+            cfg = msgspec.structs.replace(cfg, connect=args.connect)
+        except ValueError as error:
+            raise ConfigError(f"--connect: {error}") from error
     return open_zenoh(cfg, args.name, clock, args.run_id)
 
 

@@ -1,0 +1,91 @@
+import subprocess
+import sys
+import types
+from importlib import util
+
+import pytest
+
+from services import cli
+from shared.errors import ConfigError
+
+
+@pytest.fixture
+def command(monkeypatch):
+    """Make ``riposte try`` run a function."""
+
+    def make(entry) -> None:
+        module = types.ModuleType("tried")
+        module.main = entry  # type: ignore[attr-defined]
+        monkeypatch.setitem(sys.modules, "tried", module)
+        monkeypatch.setitem(cli.COMMANDS, "try", cli.Command("try", "tried", "a test"))
+
+    return make
+
+
+@pytest.mark.parametrize("name", sorted(cli.COMMANDS))
+def test_every_listed_command_is_there(name: str):
+    assert util.find_spec(cli.COMMANDS[name].module) is not None
+
+
+def test_help_lists_every_command_and_loads_none():
+    code = (
+        "import sys; from services import cli; assert cli.main(['--help']) == 0; "
+        "heavy = {'numpy', 'torch', 'mujoco', 'zenoh', 'rerun', 'rich'} & set(sys.modules); "
+        "assert not heavy, heavy"
+    )
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", code], capture_output=True, text=True, timeout=30
+    )
+    assert done.returncode == 0, done.stderr
+    assert all(f"  {name} " in done.stdout for name in cli.COMMANDS)
+
+
+def test_an_unknown_command_is_answered_with_the_nearest_one(capsys):
+    assert cli.main(["trian"]) == 2
+    assert capsys.readouterr().err == "riposte: unknown command 'trian'; did you mean 'train'?\n"
+
+
+def test_no_command_prints_the_help_and_fails(capsys):
+    assert cli.main([]) == 2
+    assert capsys.readouterr().out.startswith("usage: riposte")
+
+
+def test_the_version_is_the_distributions(capsys):
+    assert cli.main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("riposte 0.")
+
+
+def test_the_exit_code_of_a_command_is_passed_on(command):
+    command(lambda argv: len(argv))
+    assert cli.main(["try", "a", "b"]) == 2
+    assert cli.main(["try"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (ConfigError("num_envs is odd"), 2, "riposte: try: num_envs is odd\n"),
+        (KeyboardInterrupt(), 130, "riposte: try: interrupted\n"),
+        (
+            ModuleNotFoundError("No module named 'torch'", name="torch"),
+            2,
+            "riposte: try needs torch: pip install 'riposte[train]'\n",
+        ),
+    ],
+)
+def test_what_a_user_can_mend_is_one_line(command, capsys, error, code: int, line: str):
+    def entry(argv) -> int:
+        raise error
+
+    command(entry)
+    assert cli.main(["try"]) == code
+    assert capsys.readouterr().err == line
+
+
+def test_a_bug_is_not_hidden(command):
+    def entry(argv) -> int:
+        raise ModuleNotFoundError("No module named 'sharde'", name="sharde")
+
+    command(entry)
+    with pytest.raises(ModuleNotFoundError, match="sharde"):
+        cli.main(["try"])

@@ -1,0 +1,33 @@
+from pathlib import Path
+
+import pytest
+
+from services.jobs.up import SiteConfig, specs
+
+
+def test_each_process_gets_a_name_of_its_own_and_the_same_run(tmp_path: Path):
+    cfg = SiteConfig(processes=("router", "learner antagonist", "actor", "actor"))
+    site = tmp_path / "s.toml"
+    made = specs(cfg, site=site, run=tmp_path, run_id="r", node="n1-", overrides=["a.b=1"])
+    assert [spec.name for spec in made] == [
+        "n1-router-0", "n1-learner-antagonist", "n1-actor-0", "n1-actor-1",
+    ]  # fmt: skip
+    assert "--agent antagonist" in " ".join(made[1].argv)
+    for spec in made:
+        assert str(site) in spec.argv
+        assert spec.argv[-2:] == ("--set", "a.b=1")
+
+
+@pytest.mark.parametrize(
+    ("processes", "message"),
+    [
+        ((), "processes is empty"),
+        (("actr",), "processes has 'actr'; did you mean 'actor'?"),
+        (("learner",), "expected 'learner antagonist'"),
+        (("actor antagonist",), "expected 'learner antagonist'"),
+    ],
+)
+def test_a_role_that_is_none_is_refused(processes: tuple[str, ...], message: str):
+    with pytest.raises(ValueError) as caught:  # noqa: PT011
+        SiteConfig(processes=processes)
+    assert message in str(caught.value)
