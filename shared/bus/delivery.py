@@ -6,8 +6,9 @@ before without applying it again. Together: nothing acknowledged is lost, nothin
 """
 
 import bisect
-import json
-from typing import Any, Generic, TypeVar, cast
+from typing import Generic, TypeVar
+
+import msgspec
 
 from shared.bus.base import Bus, NoAnswer, Pending, Refused
 from shared.clock import Clock
@@ -168,7 +169,7 @@ class Applied:
 
     def to_json(self) -> str:
         """Return everything as one line of JSON."""
-        return json.dumps(self._boots, separators=(",", ":"))
+        return msgspec.json.encode(self._boots).decode()
 
     @classmethod
     def from_json(cls, text: str, max_boots: int = 1024, max_ranges: int = 1024) -> "Applied":
@@ -179,20 +180,19 @@ class Applied:
         """
         applied = cls(max_boots, max_ranges)
         try:
-            boots = cast("dict[str, list[list[int]]]", json.loads(text))
+            boots = msgspec.json.decode(text, type=dict[str, list[tuple[int, int]]])
             for boot, ranges in boots.items():
-                end = None
-                for first, last in ranges:
-                    if not (isinstance(first, int) and isinstance(last, int)):  # pyright: ignore[reportUnnecessaryIsInstance]
-                        raise TypeError("not a whole number")
-                    if last < first or (end is not None and first <= end + 1):
-                        raise ValueError("ranges out of order")
-                    end = last
+                ends = [-1, *(last for _, last in ranges)]
+                if any(
+                    last < first or first < end + 1 + (end >= 0)
+                    for end, (first, last) in zip(ends, ranges, strict=False)
+                ):
+                    raise ValueError(f"ranges of {boot[:80]!r} are out of order")
                 applied._boots[boot] = [[first, last] for first, last in ranges]
-        except (ValueError, TypeError, AttributeError, RecursionError) as error:
+        except ValueError as error:
             raise CheckpointError(f"record of applied messages is damaged: {error}") from error
         return applied
 
 
-def _start(item: list[int]) -> Any:
+def _start(item: list[int]) -> int:
     return item[0]
