@@ -118,14 +118,14 @@ class FencingBatch:
         """Put worlds at rest in a posture, each tool commanded to stay where it is.
 
         Args:
-            ids: int64[K], the worlds.
+            ids: int64[K], the worlds, each at most once.
             qpos: float64[K, 14], joint angles, antagonist first (rad).
         """
         if len(ids) == 0:
             return
         self._batch.state[ids] = self._begin
         self.qpos[ids] = qpos
-        self._batch.forward(ids, _STAGE)
+        self._batch.forward(np.sort(ids), _STAGE)
         rows = self.sensors[ids]
         tools = np.concatenate([rows[:, _TOOL:SENSORS], rows[:, SENSORS + _TOOL :]], axis=1)
         self._applied[ids] = tools

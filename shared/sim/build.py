@@ -49,7 +49,7 @@ def build_spec(
         agents: who stands in the scene, in the order of sensors and controls.
     """
     spec = mujoco.MjSpec()
-    spec.modelname = f"riposte {parameters.name}"
+    spec.modelname = "riposte"
     spec.compiler.degree = False
     spec.memory = ARENA_BYTES
     _set_options(spec, cfg)

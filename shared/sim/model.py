@@ -64,7 +64,8 @@ class FencingModel:
         """Compile the scene with ``parameters`` in place of the file that ``cfg`` names."""
         _silence()
         try:
-            mj = build_spec(cfg, parameters).compile()
+            spec = build_spec(cfg, parameters)
+            mj = spec.compile()
         except ValueError as error:
             raise ConfigError(f"MuJoCo refused the model {parameters.name}: {error}") from error
         bat = parameters.bat
@@ -72,7 +73,7 @@ class FencingModel:
             cfg=cfg,
             parameters=parameters,
             mj=mj,
-            hash=_hash(mj, cfg, parameters),
+            hash=_hash(spec.to_xml(), cfg, parameters),
             body_names=tuple(mj.body(index).name for index in range(mj.nbody)),
             target_centre=np.array([0.0, 0.0, cfg.target_height]),
             target_radius=cfg.target_radius,
@@ -124,19 +125,15 @@ def _en_garde(side: Side) -> Float64:
     return posture if side == "right" else posture * _MIRROR
 
 
-def _hash(mj: mujoco.MjModel, cfg: SimConfig, parameters: ModelParameters) -> str:
-    """Return the hash of the compiled physics and of what this package adds around it.
+def _hash(xml: str, cfg: SimConfig, parameters: ModelParameters) -> str:
+    """Return the hash of the physics and of what this package adds around it.
 
-    The name of the model and the place of its file are left out: they move nothing.
+    The text of the compiled model catches a change of this code or of the arm's data, the exact
+    parameters one that its digits would hide. Not the compiled bytes: their last bits depend on
+    the processor. The name of the model and the place of its file are left out: they move nothing.
     """
-    image = np.empty(mujoco.mj_sizeModel(mj), np.uint8)
-    mujoco.mj_saveModel(mj, None, image)
-    around = {
-        "command": parameters.command,
-        "bat": parameters.bat,
-        "control_timestep": cfg.control_timestep,
-        "target": (cfg.target_height, cfg.target_radius),
-    }
-    digest = hashlib.sha256(image.tobytes())
-    digest.update(msgspec.json.encode(around, order="deterministic"))
-    return digest.hexdigest()
+    exact = (
+        msgspec.structs.replace(cfg, model=""),
+        msgspec.structs.replace(parameters, name=""),
+    )
+    return hashlib.sha256(xml.encode() + msgspec.json.encode(exact)).hexdigest()

@@ -31,6 +31,8 @@ class SceneRenderer:
         self._data = mujoco.MjData(self._scene)
         self._rectangle = mujoco.MjrRect(0, 0, width, height)
         self._pixels = np.empty((height, width, 3), np.uint8)
+        size = self._scene.vis.global_
+        size.offwidth, size.offheight = width, height
         self._context = _open_context(width, height)
         self._drawing = mujoco.MjvScene(self._scene, maxgeom=1000)
         self._drawing.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 1

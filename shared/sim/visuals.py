@@ -87,9 +87,7 @@ def add_visuals(spec: mujoco.MjSpec, cfg: SimConfig, agents: Sequence[str] = AGE
 
 def _add_studio(spec: mujoco.MjSpec) -> None:
     """Add floor, sky, lights and the camera called ``audience``."""
-    spec.visual.global_.offwidth, spec.visual.global_.offheight = 3840, 2160
-    spec.visual.quality.shadowsize = 8192
-    spec.visual.quality.offsamples = 8
+    spec.visual.quality.shadowsize = 4096
     spec.visual.headlight.ambient = [0.36, 0.36, 0.37]
     spec.visual.headlight.diffuse = [0.22, 0.22, 0.22]
     spec.visual.headlight.specular = [0.05, 0.05, 0.05]
