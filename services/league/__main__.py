@@ -1,6 +1,7 @@
-"""Process of the league: ``python -m services.league SITE.toml --name league-0 --run DIR``."""
+"""``python -m services.league SITE.toml --run DIR``: the league process of one run."""
 
 import sys
+from collections.abc import Sequence
 
 from services.league.config import LeagueConfig
 from services.league.service import League
@@ -17,5 +18,10 @@ def build(args: ServeArgs, bus: Bus, clock: Clock) -> League:
     return League(cfg, bus, clock, args.run, args.run_id, cfg.seed, False, rules=rules)
 
 
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the league; return its exit code."""
+    return serve("league", build, argv)
+
+
 if __name__ == "__main__":
-    sys.exit(serve("league", build))
+    sys.exit(main())
