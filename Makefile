@@ -57,8 +57,9 @@ format: $(STAMP) ## rewrite the files as `make check` wants them
 bench: $(STAMP) ## measure, and add a row to benchmarks/RESULTS.md
 	@$(BIN)/riposte bench $(ARGS)
 
-docs: $(STAMP) ## rewrite the generated parts of docs/
-	@$(BIN)/python -m shared.messages.table docs/architecture.md
+docs: $(STAMP) ## renew the generated parts of docs/ and deploy/
+	@$(BIN)/python -m shared.messages.table --write docs/architecture.md
+	@$(BIN)/python -m services.jobs.site > deploy/local.toml.new && mv deploy/local.toml.new deploy/local.toml
 
 clean: ## remove the environment, caches and builds; runs/ stays
 	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .hypothesis .import_linter_cache

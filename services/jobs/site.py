@@ -24,12 +24,11 @@ DECLARED = {
     "game": "shared.game.rules:RuleBook",
     "action": "shared.policy.action:ActionConfig",
     "reward": "shared.game.reward:RewardConfig",
-    "router": "services.router.config:RouterConfig",
     "league": "services.league.config:LeagueConfig",
     "learner": "services.learner.config:LearnerConfig",
     "actor": "services.actor.config:ActorConfig",
     "recorder": "services.recorder.config:RecorderConfig",
-    "train": "services.jobs.train:TrainConfig",
+    "train": "services.jobs.settings:TrainConfig",
     "site": "services.jobs.up:SiteConfig",
 }
 """Where each section of a site file is declared."""
