@@ -47,9 +47,13 @@ class Ledger:
         self._lock = _take_lock(path)
         try:
             self._connection = self._open()
-            self.check_writable()
         except BaseException:
             os.close(self._lock)
+            raise
+        try:
+            self.check_writable()
+        except BaseException:
+            self.close()
             raise
 
     def _open(self) -> sqlite3.Connection:

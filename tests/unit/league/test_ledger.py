@@ -280,4 +280,4 @@ def test_a_league_on_a_small_disk_loses_nothing_it_acknowledged(tmp_path: Path) 
         assert match.play(lease, sequence=5000, bouts=100).accepted
         match.stop()
     finally:
-        os.system(f"umount {disk}")
+        assert not os.system(f"umount {disk}"), "the ledger left a file open"
