@@ -16,6 +16,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
 import structlog
 
 from services.jobs.settings import BUDGETS, Settings, TrainConfig
@@ -42,6 +43,8 @@ log = structlog.get_logger()
 POLL_SECONDS = 0.1
 FREE_BYTES = 256 << 20
 """A run needs this much disk to begin with."""
+ROUTER_SECONDS = 60.0
+"""How long the router may take to come up on a busy machine."""
 EXIT_INTERRUPTED = 130
 
 
@@ -213,9 +216,8 @@ def _train(settings: Settings, folder: Path, run: str, stop: threading.Event) ->
     supervisor = Supervisor(processes(settings, folder, run, endpoint), folder / "logs", clock)
     try:
         started = supervisor.start()
-        from msgspec.structs import replace
-
-        bus_cfg = replace(settings.bus, connect=(endpoint,))
+        _wait_for_router(endpoint, supervisor, stop)
+        bus_cfg = msgspec.structs.replace(settings.bus, connect=(endpoint,))
         with (
             contextlib.closing(open_zenoh(bus_cfg, "train", clock, run)) as bus,
             _dashboard(bus, clock, folder) as dashboard,
@@ -231,6 +233,25 @@ def _train(settings: Settings, folder: Path, run: str, stop: threading.Event) ->
         for event in supervisor.stop():
             log.info("process_stopped", process=event.name, exit_code=event.exit_code)
         (folder / "endpoint.json").unlink(missing_ok=True)
+
+
+def _wait_for_router(endpoint: str, supervisor: Supervisor, stop: threading.Event) -> None:
+    """Wait until the router accepts a connection.
+
+    Raises:
+        RiposteError: it was given up, or did not come up in time.
+    """
+    host, _, port = endpoint.partition("/")[2].rpartition(":")
+    for _ in range(round(ROUTER_SECONDS / POLL_SECONDS)):
+        if stop.is_set():
+            raise Stopped
+        for event in supervisor.poll():
+            if event.kind == "gave_up":
+                raise RiposteError(f"{event.describe}\n{event.tail}".rstrip())
+        with contextlib.suppress(OSError), socket.create_connection((host, int(port)), 1.0):
+            return
+        stop.wait(POLL_SECONDS)
+    raise RiposteError(f"the router did not listen on {endpoint} within {ROUTER_SECONDS:g} s")
 
 
 class _Watcher:

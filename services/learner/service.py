@@ -198,10 +198,11 @@ class Learner:
             if not receipt.accepted:
                 self._renumber(report, receipt)
                 continue
+            # First the policy, then the room to play on: or the next rollout is a version behind.
+            self._announce()
             for request, _ in self._committing:
                 request.reply(Receipt(accepted=True))
             self._committing = []
-            self._announce()
             if self._stage is not None and receipt.stage != self._stage.index:
                 self._stage = None
                 self._release("the stage is over")

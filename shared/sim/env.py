@@ -54,9 +54,7 @@ class FencingEnv:
         self._encoders = [ObservationEncoder(centre, float(yaw)) for yaw in model.base_yaw]
         sensors = self.batch.sensors
         self._bats = [sensors[:, s * _AGENT_SENSORS :][:, :BAT_DIM] for s in SIDES]
-        self._tools = [
-            sensors[:, s * _AGENT_SENSORS + BAT_DIM :][:, :_POSE_DIM] for s in SIDES
-        ]
+        self._tools = [sensors[:, s * _AGENT_SENSORS + BAT_DIM :][:, :_POSE_DIM] for s in SIDES]
         self._commands = [self.batch.ctrl[:, s * _POSE_DIM :][:, :_POSE_DIM] for s in SIDES]
         by_side = sensors.reshape(num_envs, 2, _AGENT_SENSORS).transpose(1, 0, 2)
         self._grips = by_side[:, :, 0:3]
@@ -75,9 +73,7 @@ class FencingEnv:
         if out is None:
             out = np.empty((self.num_envs, OBS_DIM), np.float32)
         seconds = self.scores.step * self.model.cfg.control_timestep
-        return self._encoders[side].encode(
-            self._bats[side], self._bats[1 - side], seconds, out
-        )
+        return self._encoders[side].encode(self._bats[side], self._bats[1 - side], seconds, out)
 
     def step(self, antagonist: Float32s, protagonist: Float32s) -> Judgement:
         """Carry out one control step in every bout and judge it.
