@@ -145,7 +145,8 @@ class MemoryBus:
         self._counts.sent(len(payload))
         path = _Path(bus, answer)
         bus.open_paths[path] = None
-        inbox.offer(payload, path)
+        if inbox.accepts(len(payload), path):
+            inbox.offer(payload, path)
         return answer
 
     def declare_alive(self, role: str) -> None:
