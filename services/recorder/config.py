@@ -1,0 +1,51 @@
+"""Settings of the recorder, section ``[recorder]`` of a site file."""
+
+import msgspec
+
+
+class RecorderConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What is recorded, how finely, and where it is shown."""
+
+    file: bool = True
+    """Write recording.rrd into the run's folder."""
+    live: bool = True
+    """Offer the live web view."""
+    web_port: int = 9090
+    """Port of the live view's page; another one is taken where it is in use."""
+    frames_per_second: float = 25.0
+    """Instants of the shown bout per second of the bout."""
+    live_period: float = 0.25
+    """Seconds from one batch of the live bout to the next."""
+    file_period: float = 5.0
+    """Seconds from one batch of the bout in the file to the next."""
+    status_period: float = 5.0
+    """Seconds from one point of a service's health curve to the next."""
+    bout_steps: int = 2000
+    """Control steps of a whole bout."""
+    bout_memory_mib: int = 192
+    """What the live view's server keeps of the bouts shown; the oldest part goes first."""
+    file_bouts_mib: int = 1024
+    """The file gets no more bouts above this size, only curves and events."""
+    min_free_mib: int = 256
+    """The file ends when its disk has less than this left."""
+
+    def __post_init__(self) -> None:
+        """Check the ranges.
+
+        Raises:
+            ValueError: a value is out of its range; says which, and what is allowed.
+        """
+        _check("web_port", self.web_port, 0, 65535)
+        _check("frames_per_second", self.frames_per_second, 1.0, 100.0)
+        _check("live_period", self.live_period, 0.05, 5.0)
+        _check("file_period", self.file_period, 0.1, 60.0)
+        _check("status_period", self.status_period, 0.5, 60.0)
+        _check("bout_steps", self.bout_steps, 1, 1_000_000)
+        _check("bout_memory_mib", self.bout_memory_mib, 16, 65536)
+        _check("file_bouts_mib", self.file_bouts_mib, 0, 1 << 20)
+        _check("min_free_mib", self.min_free_mib, 0, 1 << 20)
+
+
+def _check(name: str, value: float, low: float, high: float) -> None:
+    if not low <= value <= high:  # also refuses NaN
+        raise ValueError(f"recorder.{name} is {value}; allowed are {low:g} to {high:g}")
