@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from shared.game.bout import Judgement
 from shared.game.reward import reward
+from shared.messages.training import OBS_DIM
 from shared.sim.render import SceneRenderer
-from shared.sim.task import SIDES, Float32s, Opponent, Side, Task
+from shared.sim.task import SIDES, Float32s, Opponent, Side, Task, observe
 
 _FRAMES_PER_SECOND = 100
 _CHECK_EVERY = 40
@@ -32,13 +33,20 @@ class _Bouts:
         self.side = SIDES.index(agent)
         self.env = task.worlds(num_envs, num_threads)
         self.player = task.player(opponent, self.env.model.hash)
+        self._others = np.zeros((num_envs, OBS_DIM), np.float32)
         self._steps = 0
+
+    def observe(self) -> Float32s:
+        """Return float32[N, 27], what the learning side sees now, in a new array."""
+        seen = observe(self.env)
+        self._others = seen[1 - self.side]
+        return seen[self.side]
 
     def step(
         self, actions: Float32s, generator: np.random.Generator
     ) -> tuple[NDArray[np.float64], Judgement]:
-        """Carry out one step; return float64[N] rewards and what was judged."""
-        other = self.player.act(self.env.observe(1 - self.side), generator)
+        """Carry out one step since the last look; return float64[N] rewards and the judgement."""
+        other = self.player.act(self._others, generator)
         pair = (actions, other) if self.side == 0 else (other, actions)
         judgement = self.env.step(*pair)
         self._steps += 1
@@ -91,7 +99,7 @@ class FencingSingleEnv(gymnasium.Env[Float32s, Float32s]):
         """Start a bout en garde; ``options`` are not used."""
         super().reset(seed=seed, options=options)
         self._bouts.env.reset(np.array([0]), self.np_random)
-        return self._bouts.env.observe(self._bouts.side)[0], self._info(None)
+        return self._bouts.observe()[0], self._info(None)
 
     def step(self, action: Float32s) -> tuple[Float32s, float, bool, bool, dict[str, Any]]:
         """Carry out one control step of 10 ms."""
@@ -99,7 +107,7 @@ class FencingSingleEnv(gymnasium.Env[Float32s, Float32s]):
         actions = np.asarray(action, np.float32)[None]
         paid, judgement = self._bouts.step(actions, self.np_random)
         truncated = bool(env.scores.finished()[0])
-        obs = env.observe(self._bouts.side)[0]
+        obs = self._bouts.observe()[0]
         return obs, float(paid[0]), False, truncated, self._info(judgement)
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
@@ -176,17 +184,17 @@ class FencingVectorEnv(gymnasium.vector.VectorEnv[Float32s, Float32s, NDArray[An
         env, worlds = self._bouts.env, np.arange(self.num_envs)
         first = worlds * env.rules.bout_steps // self.num_envs if self._staggered else 0 * worlds
         env.reset(worlds, self.np_random, first.astype(np.int32))
-        return env.observe(self._bouts.side), {}
+        return self._bouts.observe(), {}
 
     def step(
         self, actions: Float32s
     ) -> tuple[Float32s, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Carry out one control step of 10 ms in every bout."""
-        env, side = self._bouts.env, self._bouts.side
+        env = self._bouts.env
         paid, _ = self._bouts.step(np.asarray(actions, np.float32), self.np_random)
         truncated = env.scores.finished()
         info: dict[str, Any] = {}
-        obs = env.observe(side)
+        obs = self._bouts.observe()
         if truncated.any():
             final = np.full(self.num_envs, None, object)
             for world in np.flatnonzero(truncated):
@@ -196,5 +204,5 @@ class FencingVectorEnv(gymnasium.vector.VectorEnv[Float32s, Float32s, NDArray[An
             info["final_info"] = {"score": score, "_score": truncated}
             info["_final_info"] = truncated
             env.reset(np.flatnonzero(truncated), self.np_random)
-            obs = env.observe(side)
+            obs = self._bouts.observe()
         return obs, paid, np.zeros(self.num_envs, np.bool_), truncated, info

@@ -10,7 +10,7 @@ from pettingzoo import ParallelEnv
 
 from shared.game.reward import reward
 from shared.sim.render import SceneRenderer
-from shared.sim.task import SIDES, Float32s, Side, Task
+from shared.sim.task import SIDES, Float32s, Side, Task, observe
 
 _FRAMES_PER_SECOND = 100
 
@@ -119,4 +119,4 @@ class FencingParallelEnv(ParallelEnv[Side, Float32s, Float32s]):
             self._renderer = None
 
     def _observe(self) -> dict[Side, Float32s]:
-        return {side: self._env.observe(i)[0] for i, side in enumerate(SIDES)}
+        return {side: seen[0] for side, seen in zip(SIDES, observe(self._env), strict=True)}

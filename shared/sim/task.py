@@ -83,6 +83,13 @@ class Task(msgspec.Struct, frozen=True, kw_only=True):
         return _Function(opponent) if callable(opponent) else opponent
 
 
+def observe(env: FencingEnv) -> tuple[Float32s, Float32s]:
+    """Return what antagonist and protagonist see now: new arrays, float32[N, 27] each."""
+    antagonist, protagonist = np.empty((2, env.num_envs, OBS_DIM), np.float32)
+    env.observe(antagonist, protagonist)
+    return antagonist, protagonist
+
+
 def _float32s(box: gymnasium.spaces.Box[Any]) -> "gymnasium.Space[Float32s]":
     return cast("gymnasium.Space[Float32s]", box)  # a box does not tell its dtype to the checker
 

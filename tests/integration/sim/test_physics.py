@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from shared.policy.action import ActionConfig, bounded_offset, desired_pose
+from shared.game.rules import RuleBook
+from shared.policy.action import ActionConfig
 from shared.sim.arm import load_arm
 from shared.sim.batch import FencingBatch
 from shared.sim.config import SimConfig
+from shared.sim.env import FencingEnv
 from shared.sim.model import FencingModel
 from shared.sim.parameters import (
     JOINT_NAMES,
@@ -152,24 +154,21 @@ def test_joint_speed_and_torque_stay_within_the_pr2s_under_any_bounded_command()
     speed = np.tile([joint.velocity_limit for joint in arm.joints], 2)
     torque = np.tile([NOMINAL.joints[name].torque_limit for name in JOINT_NAMES], 2)
     rng = np.random.default_rng(5)
-    batch = FencingBatch(model, 64)
+    env = FencingEnv(model, RuleBook(), ActionConfig(), 64)
+    batch = env.batch
     batch.reset(np.arange(64), postures(64, 6, model))
     data = mujoco.MjData(model.mj)
     fastest = np.zeros(14)
     actions = np.zeros((2, 64, 6), np.float32)
     for step in range(400):
-        if step % 10 == 0:  # long enough in one direction to gain speed
+        if step % 10 == 0:  # the longest offsets, long enough in one direction to gain speed
             actions = rng.normal(size=(2, 64, 6)).astype(np.float32) * 10
-        for agent in range(2):  # the longest offsets the decoder lets through
-            tool = batch.sensors[:, 20 * agent + 13 : 20 * agent + 20]
-            offset = bounded_offset(actions[agent], ActionConfig())
-            desired_pose(offset, tool, batch.ctrl[:, 7 * agent : 7 * agent + 7])
+        env.step(actions[0], actions[1])
         if step % 40 == 0:
             data.qpos[:], data.qvel[:] = batch.qpos[step % 64], batch.qvel[step % 64]
             data.ctrl[:] = batch.ctrl[step % 64]
             mujoco.mj_forward(model.mj, data)
             assert (np.abs(data.qfrc_actuator) <= torque + 1e-12).all()
-        batch.step()
         fastest = np.maximum(fastest, np.abs(batch.qvel).max(axis=0))
     batch.check()
     assert (fastest <= 1.10 * speed).all(), (fastest / speed).round(2)
