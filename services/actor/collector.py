@@ -127,8 +127,7 @@ class Collector:
         other_obs = np.empty((worlds, OBS_DIM), np.float32)
         first_step = env.scores.step.copy()
         for step in range(steps):
-            env.observe(side, obs[step])
-            env.observe(1 - side, other_obs)
+            env.observe(*((obs[step], other_obs) if side == 0 else (other_obs, obs[step])))
             means[step] = policy.mean(obs[step])
             actions[step] = policy.sample(means[step], noise[step])
             other = self._opponent.act(other_obs, self._generator)
@@ -138,7 +137,8 @@ class Collector:
             if on_step is not None:
                 on_step(judgement)
         env.batch.check()
-        last_obs = env.observe(side)
+        last_obs = np.empty_like(other_obs)
+        env.observe(*((last_obs, other_obs) if side == 0 else (other_obs, last_obs)))
         finished = env.finished()
         bouts = self._bouts.copy()
         truncated = np.zeros(worlds, np.bool_)
@@ -221,9 +221,12 @@ class Evaluation:
     ) -> Results | None:
         """Play up to so many steps; return the results once the bouts are over."""
         env = self._env
+        obs = [np.empty((env.num_envs, OBS_DIM), np.float32) for _ in self._players]
         for _ in range(min(steps, self.left)):
+            env.observe(*obs)
             actions = [
-                self._players[side].act(env.observe(side), self._generator) for side in (0, 1)
+                player.act(seen, self._generator)
+                for player, seen in zip(self._players, obs, strict=True)
             ]
             judgement = env.step(*actions)
             self.left -= 1

@@ -56,18 +56,13 @@ class Scoreboard:
         """Score one step of every bout from the bats' poses.
 
         Args:
-            grips: float64[2, N, 3], origins of the bat frames in the world, antagonist first.
-            quaternions: float64[2, N, 4], their orientations, w x y z.
+            grips: float64[3, 2, N], origins of the bat frames in the world, antagonist first.
+            quaternions: float64[4, 2, N], their orientations, w x y z.
         """
         directions = blade_direction(quaternions)
-        to_target = np.stack(
-            [
-                distance_to_target(grips[side], directions[side], self.bat, self.target)
-                for side in (0, 1)
-            ]
-        )
+        to_target = distance_to_target(grips, directions, self.bat, self.target)
         between = distance_between_bats(
-            grips[0], directions[0], grips[1], directions[1], self.bat
+            grips[:, 0], directions[:, 0], grips[:, 1], directions[:, 1], self.bat
         )
         in_target = to_target <= 0.0
         contact = between <= 0.0
@@ -77,7 +72,7 @@ class Scoreboard:
         self.score += points
         penalty = in_target[0] & contact
         self.penalty_steps += penalty
-        self.attack_steps += in_target[0] & ~penalty
+        self.attack_steps += in_target[0] ^ penalty
         self.camping_steps += is_camping_paid(self.camping, self.rules)
         return Judgement(points, in_target[0], in_target[1], contact, to_target, between)
 

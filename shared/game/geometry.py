@@ -1,6 +1,8 @@
 """Bats are capsules and the target is a sphere; both judges ask their questions here.
 
-Everything is vectorised over N worlds and works on positions in metres in one common frame.
+Everything is vectorised and works on positions in metres in one common frame. Vectors stand
+component first, ``[3, ...]``: a component of all worlds is then one contiguous stretch of memory,
+which is what makes judging a step cheap beside simulating it.
 """
 
 import dataclasses
@@ -38,16 +40,16 @@ def blade_direction(quaternions: Floats) -> Floats:
     """Return the unit x axes of the frames with these orientations.
 
     Args:
-        quaternions: float64[..., 4], unit, w x y z.
+        quaternions: float64[4, ...], unit, w x y z.
 
     Returns:
-        float64[..., 3].
+        float64[3, ...].
     """
-    w, x, y, z = np.moveaxis(quaternions, -1, 0)
-    direction = np.empty((*quaternions.shape[:-1], 3))
-    direction[..., 0] = 1.0 - 2.0 * (y * y + z * z)
-    direction[..., 1] = 2.0 * (x * y + w * z)
-    direction[..., 2] = 2.0 * (x * z - w * y)
+    w, x, y, z = quaternions
+    direction = np.empty((3, *quaternions.shape[1:]))
+    direction[0] = 1.0 - 2.0 * (y * y + z * z)
+    direction[1] = 2.0 * (x * y + w * z)
+    direction[2] = 2.0 * (x * z - w * y)
     return direction
 
 
@@ -55,19 +57,18 @@ def distance_to_target(grips: Floats, directions: Floats, bat: BatShape, target:
     """Return how far each bat's surface is from the surface of the target (m); negative inside.
 
     Args:
-        grips: float64[N, 3], origins of the bat frames.
-        directions: float64[N, 3], unit vectors along the blades.
+        grips: float64[3, ...], origins of the bat frames.
+        directions: float64[3, ...], unit vectors along the blades.
         bat: shape of the bats.
         target: the sphere.
 
     Returns:
-        float64[N].
+        float64[...].
     """
-    to_centre = np.asarray(target.centre) - grips
-    along = np.einsum("ij,ij->i", to_centre, directions)
-    np.clip(along, bat.back, bat.front, out=along)
-    gap = to_centre - along[:, None] * directions
-    return np.sqrt(np.einsum("ij,ij->i", gap, gap)) - (bat.radius + target.radius)
+    centre = np.asarray(target.centre).reshape(3, *(1 for _ in grips.shape[1:]))
+    to_centre = centre - grips
+    along = np.clip(dot(to_centre, directions), bat.back, bat.front)
+    return length(to_centre - along * directions) - (bat.radius + target.radius)
 
 
 def distance_between_bats(
@@ -79,21 +80,30 @@ def distance_between_bats(
     guess on A is clamped, B answers it, and A answers B; exact because the problem is convex.
 
     Args:
-        grips_a: float64[N, 3], origin of each bat frame; ``grips_b`` likewise.
-        directions_a: float64[N, 3], unit vector along each blade; ``directions_b`` likewise.
+        grips_a: float64[3, ...], origin of each bat frame; ``grips_b`` likewise.
+        directions_a: float64[3, ...], unit vector along each blade; ``directions_b`` likewise.
         bat: shape of both bats.
 
     Returns:
-        float64[N].
+        float64[...].
     """
     offset = grips_a - grips_b
-    cosine = np.einsum("ij,ij->i", directions_a, directions_b)
-    a_offset = np.einsum("ij,ij->i", directions_a, offset)
-    b_offset = np.einsum("ij,ij->i", directions_b, offset)
+    cosine = dot(directions_a, directions_b)
+    a_offset = dot(directions_a, offset)
+    b_offset = dot(directions_b, offset)
     # Parallel blades leave the first guess free; any finite one is corrected by the two answers.
     sine_squared = np.maximum(1.0 - cosine * cosine, 1e-12)
     on_a = np.clip((cosine * b_offset - a_offset) / sine_squared, bat.back, bat.front)
     on_b = np.clip(cosine * on_a + b_offset, bat.back, bat.front)
     on_a = np.clip(cosine * on_b - a_offset, bat.back, bat.front)
-    gap = offset + on_a[:, None] * directions_a - on_b[:, None] * directions_b
-    return np.sqrt(np.einsum("ij,ij->i", gap, gap)) - 2.0 * bat.radius
+    return length(offset + on_a * directions_a - on_b * directions_b) - 2.0 * bat.radius
+
+
+def dot(a: Floats, b: Floats) -> Floats:
+    """Return the scalar products of vectors that stand component first."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def length(a: Floats) -> Floats:
+    """Return the lengths of vectors that stand component first."""
+    return np.sqrt(dot(a, a))

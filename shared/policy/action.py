@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from shared.policy.schema import schema_hash
 
 Floats = NDArray[np.float64]
-Actions = NDArray[np.float32]
 
 
 class ActionConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -39,39 +38,46 @@ ACTION_SCHEMA = schema_hash(
 )
 
 
-def bounded_offset(actions: Actions, cfg: ActionConfig) -> Floats:
+def bounded_offset(actions: Floats, cfg: ActionConfig) -> Floats:
     """Return the offsets that actions ask for, each vector at most as long as its bound.
 
     Args:
-        actions: float32[N, 6], in units of the bounds.
+        actions: float64[..., 6, N], in units of the bounds.
         cfg: the bounds.
 
     Returns:
-        float64[N, 6]: translation (m) and rotation vector (rad).
+        float64[..., 6, N]: translation (m) and rotation vector (rad).
     """
-    vectors = actions.astype(np.float64).reshape(-1, 2, 3)
-    lengths = np.sqrt(np.einsum("nij,nij->ni", vectors, vectors))
-    scale = np.array([cfg.offset_bound_m, cfg.offset_bound_rad]) / np.maximum(lengths, 1.0)
-    vectors *= scale[:, :, None]
-    return vectors.reshape(-1, 6)
+    vectors = actions.reshape(*actions.shape[:-2], 2, 3, actions.shape[-1])
+    x, y, z = np.moveaxis(vectors, -2, 0)
+    lengths = np.sqrt(x * x + y * y + z * z)
+    bounds = np.array([[cfg.offset_bound_m], [cfg.offset_bound_rad]])
+    scale = bounds / np.maximum(lengths, 1.0)
+    return (vectors * scale[..., None, :]).reshape(actions.shape)
 
 
-def desired_pose(offsets: Floats, tool_pose: Floats, out: Floats) -> None:
-    """Write the pose to command: the tool's current pose moved by an offset.
+def desired_pose(offsets: Floats, tools: Floats) -> Floats:
+    """Return the poses to command: the tools' current poses moved by offsets.
 
     Args:
-        offsets: float64[N, 6], translation (m) and rotation vector (rad) in the torso frame.
-        tool_pose: float64[N, 7], position and orientation (w x y z) in the torso frame.
-        out: float64[N, 7], written.
+        offsets: float64[..., 6, N], translation (m) and rotation vector (rad) in the torso frame.
+        tools: float64[..., 7, N], position and orientation (w x y z) in the torso frame.
+
+    Returns:
+        float64[..., 7, N].
     """
-    np.add(tool_pose[:, :3], offsets[:, :3], out=out[:, :3])
-    half = 0.5 * offsets[:, 3:]
-    angle = np.sqrt(np.einsum("ij,ij->i", half, half))
-    half *= np.sinc(angle / np.pi)[:, None]
-    a = np.cos(angle)
-    b, c, d = half.T
-    w, x, y, z = tool_pose[:, 3:].T
-    out[:, 3] = a * w - b * x - c * y - d * z
-    out[:, 4] = a * x + b * w + c * z - d * y
-    out[:, 5] = a * y - b * z + c * w + d * x
-    out[:, 6] = a * z + b * y - c * x + d * w
+    out = np.empty_like(tools)
+    out[..., :3, :] = tools[..., :3, :] + offsets[..., :3, :]
+    half = 0.5 * offsets[..., 3:, :]
+    b, c, d = np.moveaxis(half, -2, 0)
+    angle = np.sqrt(b * b + c * c + d * d)
+    sine = np.sin(angle)
+    a = np.sqrt(1.0 - sine * sine)  # half a turn is never reached: the cosine is positive
+    # The floor keeps 0 / 0 out; half is 0 there anyway.
+    half *= (sine / np.maximum(angle, 1e-12))[..., None, :]
+    w, x, y, z = np.moveaxis(tools[..., 3:, :], -2, 0)
+    out[..., 3, :] = a * w - b * x - c * y - d * z
+    out[..., 4, :] = a * x + b * w + c * z - d * y
+    out[..., 5, :] = a * y - b * z + c * w + d * x
+    out[..., 6, :] = a * z + b * y - c * x + d * w
+    return out

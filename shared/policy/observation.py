@@ -5,10 +5,11 @@ x from the own side towards the other, z up. So both sides see the game alike. P
 angular velocities turn into that frame by one linear map, which makes the encoder one product.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.messages.training import OBS_DIM
 from shared.policy.schema import schema_hash
 
 Floats = NDArray[np.float64]
@@ -16,6 +17,8 @@ Observations = NDArray[np.float32]
 
 BAT_DIM = 13
 """Position (3, m), orientation (4, w x y z), linear (3, m/s) and angular velocity (3, rad/s)."""
+_QUATERNION = 3
+"""Where the orientation stands in a bat's state."""
 
 OWN_REFERENCE = (0.58, 0.55, -0.33, 0.49)
 OTHER_REFERENCE = (0.49, -0.33, -0.55, -0.58)
@@ -42,52 +45,73 @@ def _quaternion_product_matrix(q: Floats) -> Floats:
 
 
 class ObservationEncoder:
-    """Turns two bat states and the time into what one side's policy sees."""
+    """Turns two bat states and the time into what each of several observers sees.
 
-    def __init__(self, centre: tuple[float, float, float], yaw: float) -> None:
+    Every number but the time is linear in the bats' states, up to the sign of the quaternions;
+    so are the four products that decide those signs. One matrix product gives all of them.
+    """
+
+    def __init__(self, centre: tuple[float, float, float], yaws: Sequence[float]) -> None:
         """Prepare the map.
 
         Args:
             centre: of the target, in the frame the bats are tracked in (m).
-            yaw: heading of the observing side in that frame (rad): 0 looks along +x.
+            yaws: heading of each observing side in that frame (rad), 0 looks along +x; observer
+                0 owns bat 0, observer 1 bat 1.
         """
-        cosine, sine = np.cos(yaw), np.sin(yaw)
-        turn = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-        half = np.array([np.cos(yaw / 2), 0.0, 0.0, -np.sin(yaw / 2)])
-        bat = np.zeros((BAT_DIM, BAT_DIM))
-        bat[0:3, 0:3] = turn
-        bat[3:7, 3:7] = _quaternion_product_matrix(half)
-        bat[7:10, 7:10] = turn
-        bat[10:13, 10:13] = turn
-        bat[np.abs(bat) < 1e-12] = 0.0
-        self._map_transposed = np.ascontiguousarray(bat.T)
-        self._shift = np.zeros(BAT_DIM)
-        self._shift[0:3] = -turn @ np.asarray(centre)
+        blocks: list[Floats] = []
+        shifts: list[Floats] = []
+        for own, yaw in enumerate(yaws):
+            turn, shift = _turn_and_shift(np.asarray(centre), yaw)
+            other = 1 - own
+            block = np.zeros((2 * BAT_DIM, 2 * BAT_DIM))
+            block[own * BAT_DIM : (own + 1) * BAT_DIM, :BAT_DIM] = turn
+            block[other * BAT_DIM : (other + 1) * BAT_DIM, BAT_DIM:] = turn
+            blocks.append(block)
+            shifts.append(np.concatenate([shift, shift]))
+        self._observers = len(yaws)
+        columns = np.concatenate(blocks, axis=1)
+        starts = 2 * BAT_DIM * np.arange(self._observers)[:, None] + [_QUATERNION, BAT_DIM + _QUATERNION]
+        signs = [
+            columns[:, start : start + 4] @ reference
+            for start, reference in zip(
+                starts.ravel(), [OWN_REFERENCE, OTHER_REFERENCE] * self._observers, strict=True
+            )
+        ]
+        self._map = np.concatenate([columns, np.stack(signs, axis=1)], axis=1).astype(np.float32)
+        self._shift = np.concatenate(shifts).astype(np.float32)
+        self._quaternions = (starts.ravel()[:, None] + np.arange(4)).ravel()
 
-    def encode(
-        self, own: Floats, other: Floats, seconds: Floats, out: Observations | None = None
-    ) -> Observations:
-        """Return what the side sees.
+    def encode(self, bats: Floats, seconds: Floats, outs: Sequence[Observations]) -> None:
+        """Write what each observer sees.
 
         Args:
-            own: float64[N, 13], state of the own bat in the tracking frame.
-            other: float64[N, 13], state of the other bat.
+            bats: float64[N, 26], the states of bat 0 and bat 1 in the tracking frame: position,
+                orientation (w x y z), linear and angular velocity.
             seconds: float64[N], game time.
-            out: float32[N, 27] to write into; a new array without it.
-
-        Returns:
-            float32[N, 27].
+            outs: float32[N, 27] for each observer.
         """
-        if out is None:
-            out = np.empty((len(own), OBS_DIM), np.float32)
-        for bat, start, reference in (
-            (own, 0, OWN_REFERENCE),
-            (other, BAT_DIM, OTHER_REFERENCE),
-        ):
-            turned = bat @ self._map_transposed
-            turned += self._shift
-            quaternion = turned[:, 3:7]
-            quaternion *= np.copysign(1.0, quaternion @ reference)[:, None]
-            out[:, start : start + BAT_DIM] = turned
-        out[:, 2 * BAT_DIM] = seconds
-        return out
+        mapped = bats.astype(np.float32) @ self._map
+        width = 2 * BAT_DIM
+        numbers, products = mapped[:, : self._observers * width], mapped[:, self._observers * width :]
+        numbers += self._shift
+        numbers[:, self._quaternions] *= np.repeat(np.copysign(np.float32(1.0), products), 4, axis=1)
+        for observer, out in enumerate(outs):
+            out[:, :width] = numbers[:, observer * width : (observer + 1) * width]
+            out[:, width] = seconds
+
+
+def _turn_and_shift(centre: Floats, yaw: float) -> tuple[Floats, Floats]:
+    """Return float64[13, 13] and float64[13]: bat state (a row) into the arena frame of a side."""
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    turn = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    half = np.array([np.cos(yaw / 2), 0.0, 0.0, -np.sin(yaw / 2)])
+    bat = np.zeros((BAT_DIM, BAT_DIM))
+    bat[0:3, 0:3] = turn
+    bat[3:7, 3:7] = _quaternion_product_matrix(half)
+    bat[7:10, 7:10] = turn
+    bat[10:13, 10:13] = turn
+    bat[np.abs(bat) < 1e-12] = 0.0
+    shift = np.zeros(BAT_DIM)
+    shift[0:3] = -turn @ centre
+    return bat.T, shift

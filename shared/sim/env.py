@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from shared.game.bout import Judgement, Scoreboard
 from shared.game.geometry import BatShape, Target
 from shared.game.rules import RuleBook
-from shared.messages.training import OBS_DIM
+from shared.messages.training import ACTION_DIM
 from shared.policy.action import ActionConfig, bounded_offset, desired_pose
 from shared.policy.observation import BAT_DIM, ObservationEncoder
 from shared.sim.batch import FencingBatch
@@ -20,9 +20,6 @@ Floats = NDArray[np.float64]
 Float32s = NDArray[np.float32]
 Longs = NDArray[np.int64]
 
-SIDES = (0, 1)
-"""Antagonist, protagonist: the order of every per-side axis."""
-_AGENT_SENSORS = 20
 _POSE_DIM = 7
 START_NOISE_RAD = 0.1
 """Uniform noise on each joint of the en-garde pose."""
@@ -51,29 +48,23 @@ class FencingEnv:
             Target(centre, model.target_radius),
         )
         self._action = action
-        self._encoders = [ObservationEncoder(centre, float(yaw)) for yaw in model.base_yaw]
-        sensors = self.batch.sensors
-        self._bats = [sensors[:, s * _AGENT_SENSORS :][:, :BAT_DIM] for s in SIDES]
-        self._tools = [sensors[:, s * _AGENT_SENSORS + BAT_DIM :][:, :_POSE_DIM] for s in SIDES]
-        self._commands = [self.batch.ctrl[:, s * _POSE_DIM :][:, :_POSE_DIM] for s in SIDES]
-        by_side = sensors.reshape(num_envs, 2, _AGENT_SENSORS).transpose(1, 0, 2)
-        self._grips = by_side[:, :, 0:3]
-        self._orientations = by_side[:, :, 3:7]
+        self._encoder = ObservationEncoder(centre, model.base_yaw)
+        by_side = self.batch.sensors.reshape(num_envs, 2, -1)
+        self._bats = by_side[:, :, :BAT_DIM]
+        self._poses = by_side[:, :, :_POSE_DIM].transpose(2, 1, 0)
+        self._tools = by_side[:, :, BAT_DIM:].transpose(1, 2, 0)
+        self._commands = self.batch.ctrl.reshape(num_envs, 2, _POSE_DIM).transpose(1, 2, 0)
 
-    def observe(self, side: int, out: Float32s | None = None) -> Float32s:
-        """Return what one side sees now.
+    def observe(self, antagonist: Float32s, protagonist: Float32s) -> None:
+        """Write what each side sees now.
 
         Args:
-            side: 0 antagonist, 1 protagonist.
-            out: float32[N, 27] to write into; a new array without it.
-
-        Returns:
-            float32[N, 27].
+            antagonist: float32[N, 27], written.
+            protagonist: float32[N, 27], written.
         """
-        if out is None:
-            out = np.empty((self.num_envs, OBS_DIM), np.float32)
         seconds = self.scores.step * self.model.cfg.control_timestep
-        return self._encoders[side].encode(self._bats[side], self._bats[1 - side], seconds, out)
+        bats = self._bats.reshape(self.num_envs, 2 * BAT_DIM)
+        self._encoder.encode(bats, seconds, (antagonist, protagonist))
 
     def step(self, antagonist: Float32s, protagonist: Float32s) -> Judgement:
         """Carry out one control step in every bout and judge it.
@@ -82,11 +73,14 @@ class FencingEnv:
             antagonist: float32[N, 6], actions in units of their bounds, unclipped.
             protagonist: float32[N, 6].
         """
-        for side, actions in enumerate((antagonist, protagonist)):
-            offsets = bounded_offset(actions, self._action)
-            desired_pose(offsets, self._tools[side], self._commands[side])
+        actions = np.empty((2, ACTION_DIM, self.num_envs))
+        actions[0] = antagonist.T
+        actions[1] = protagonist.T
+        offsets = bounded_offset(actions, self._action)
+        self._commands[:] = desired_pose(offsets, np.ascontiguousarray(self._tools))
         self.batch.step()
-        return self.scores.judge(self._grips, self._orientations)
+        poses = np.ascontiguousarray(self._poses)
+        return self.scores.judge(poses[:3], poses[3:])
 
     def reset(
         self, bouts: Longs, generator: np.random.Generator, first_step: NDArray[np.int32] | int = 0
