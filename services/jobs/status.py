@@ -22,6 +22,8 @@ LISTEN_SECONDS = 1.5
 """Every process reports once a second."""
 OPEN_SECONDS = 3.0
 """A person waits for the answer."""
+PIPE_WIDTH = 160
+"""Columns of the table where nobody's terminal sets them."""
 EXIT_NOBODY = 1
 
 
@@ -108,30 +110,49 @@ def to_json(snapshot: Snapshot) -> dict[str, Any]:
 
 def headline(progress: Progress) -> str:
     """Return where the run stands, in one line."""
-    learner = f"{progress.agent} learns" if progress.agent else "evaluation"
-    return (
-        f"{progress.run}: phase {progress.phase}, iteration {progress.iteration}, stage "
-        f"{progress.stage + 1}/{progress.stages}, {learner}, "
-        f"update {progress.update}/{progress.max_updates}, score {progress.score_mean:.0f} "
-        f"[{progress.score_low:.0f}, {progress.score_high:.0f}], "
-        f"{progress.samples_per_s:.0f} samples/s, policy lag {progress.policy_lag_mean:.2f}, "
-        f"dropped rollouts {progress.dropped_rollouts}{_eta(progress.eta_seconds)}"
-    )
+    parts = [f"{progress.run}: phase {progress.phase}"]
+    if progress.iteration:
+        parts.append(f"iteration {progress.iteration}")
+    if progress.agent:
+        parts += [
+            f"stage {progress.stage + 1}/{progress.stages}",
+            f"{progress.agent} learns",
+            f"update {progress.update}/{progress.max_updates}",
+        ]
+    if progress.evaluations_total:
+        parts.append(f"evaluations {progress.evaluations_done}/{progress.evaluations_total}")
+    if progress.score_bouts:
+        low, high = progress.score_low, progress.score_high
+        parts.append(f"score {progress.score_mean:.0f} [{low:.0f}, {high:.0f}]")
+    if progress.samples_per_s:
+        parts.append(f"{progress.samples_per_s:.0f} samples/s")
+        parts.append(f"policy lag {progress.policy_lag_mean:.2f}")
+    if progress.dropped_rollouts:
+        parts.append(f"dropped rollouts {progress.dropped_rollouts}")
+    if progress.eta_seconds >= 0:
+        minutes, rest = divmod(round(progress.eta_seconds), 60)
+        parts.append(f"{minutes}:{rest:02d} left")
+    return ", ".join(parts)
 
 
 def table(snapshot: Snapshot) -> Table:
     """Return one row for each service."""
     made = Table(box=None, pad_edge=False, header_style="bold")
-    for title in ("service", "state", "waits for", "rates", "dropped", "cpu", "memory"):
-        made.add_column(title, justify="right" if title in ("cpu", "memory") else "left")
+    made.add_column("service", no_wrap=True)
+    made.add_column("state")
+    made.add_column("waits for")
+    made.add_column("rates", no_wrap=True)
+    made.add_column("dropped", no_wrap=True)
+    made.add_column("cpu", justify="right", no_wrap=True)
+    made.add_column("memory", justify="right", no_wrap=True)
     made.add_column("last error", style="red")
     for status in snapshot.services:
         made.add_row(
             status.name,
             status.state,
             waits(status),
-            " ".join(f"{name} {value:.4g}" for name, value in sorted(status.rates.items())),
-            " ".join(f"{name} {count}" for name, count in drops(status).items()),
+            "\n".join(f"{name} {value:,.0f}" for name, value in sorted(status.rates.items())),
+            "\n".join(f"{name} {count}" for name, count in drops(status).items()),
             f"{status.cpu_seconds:.0f} s",
             f"{status.rss_bytes / 2**20:.0f} MiB",
             status.last_error,
@@ -174,7 +195,10 @@ def main(argv: Sequence[str]) -> int:
     elif snapshot.services:
         if snapshot.progress is not None:
             print(headline(snapshot.progress))
-        Console().print(table(snapshot))
+        console = Console()
+        if not console.is_terminal:
+            console.width = PIPE_WIDTH
+        console.print(table(snapshot))
     else:
         print(f"nobody answers at {', '.join(args.connect) or args.site} for run {args.run_id!r}")
     return 0 if snapshot.services else EXIT_NOBODY
@@ -192,10 +216,3 @@ def add_bus_arguments(parser: argparse.ArgumentParser) -> None:
         "--connect", action="append", default=[], metavar="ENDPOINT",
         help="bus endpoint, as in tcp/127.0.0.1:7447; may be repeated",
     )  # fmt: skip
-
-
-def _eta(seconds: float) -> str:
-    if seconds < 0:
-        return ""
-    minutes, rest = divmod(round(seconds), 60)
-    return f", {minutes}:{rest:02d} left"

@@ -21,6 +21,7 @@ MAX_BYTES = 16 << 20
 """A log file is set aside as ``<name>.jsonl.1`` when it has grown to this; one is kept."""
 
 _BOUND = ("service", "run_id", "commit", "timestamp", "level", "event", "exception")
+_FIRST = ("timestamp", "level", "service", "event")
 Event: TypeAlias = MutableMapping[str, Any]
 
 
@@ -112,4 +113,5 @@ def _render(_logger: object, method: str, event: Event) -> tuple[tuple[Lines], d
     if "exception" in event:
         console += f" ({event['exception'].splitlines()[-1]})"
     level = logging.getLevelNamesMapping()[event["level"].upper()]
-    return (Lines(json.dumps(event, default=str), console, level),), {}
+    first = {key: event[key] for key in _FIRST if key in event}
+    return (Lines(json.dumps(first | event, default=str), console, level),), {}

@@ -102,3 +102,24 @@ def test_a_service_without_a_bus_ends_with_the_code_for_start_me_again(tmp_path:
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 75, done.stderr
     assert done.stderr.splitlines()[-1].startswith("actor-0: no router at tcp/127.0.0.1:")
+
+
+def test_up_starts_what_a_site_file_lists_and_stops_it_in_reverse(tmp_path: Path):
+    site = tmp_path / "site.toml"
+    site.write_text(
+        f'[bus]\nlisten = ["tcp/127.0.0.1:{free_port()}"]\n'
+        '[site]\nprocesses = ["router", "league"]\n',
+        encoding="utf-8",
+    )
+    command = [sys.executable, "-P", "-m", "services.cli", "up", site, "--run", tmp_path / "run"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as up:
+        assert up.stdout is not None
+        started = [up.stdout.readline(), up.stdout.readline()]
+        second = subprocess.run(command, capture_output=True, text=True, timeout=60)
+        up.terminate()
+        stopped = up.stdout.read().splitlines()
+        assert up.wait(60) == 0
+    assert started == ["router-0 started\n", "league-0 started\n"]
+    assert [line.split(" ")[0] for line in stopped] == ["league-0", "router-0"]
+    assert second.returncode == 2
+    assert f"run is in use by process {up.pid}" in second.stderr

@@ -36,7 +36,7 @@ def test_what_services_say_is_gathered_and_shown_as_one_row_each():
         console.print(status.table(snapshot))
     row = capture.get().splitlines()[1]
     for text in (
-        "actor-0", "playing", "learner-antagonist for 3.2 s", "samples_per_s 1.235e+04",
+        "actor-0", "playing", "learner-antagonist for 3.2 s", "samples_per_s 12,346",
         "rollouts_dropped 2", "100 MiB", "lease lapsed",
     ):  # fmt: skip
         assert text in row
@@ -46,7 +46,9 @@ def test_what_services_say_is_gathered_and_shown_as_one_row_each():
 
 def test_the_headline_says_who_learns_and_how_long_it_takes():
     line = status.headline(PROGRESS_NOW)
-    assert "iteration 1, stage 2/4, protagonist learns, update 3/120, score 1500" in line
+    assert (
+        "iteration 1, stage 2/4, protagonist learns, update 3/120, score 1500 [1400, 1600]" in line
+    )
     assert line.endswith(", 2:05 left")
 
 
