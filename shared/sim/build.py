@@ -22,8 +22,9 @@ CONTROLS: Final = 7
 """Per agent: desired tool position and quaternion (w, x, y, z) in its torso frame."""
 SENSORS: Final = 20
 """Per agent: bat position, quaternion, velocities in the world; tool pose in the torso frame."""
-ARENA_BYTES: Final = 200_000
-"""Scratch memory of one world: enough for every contact there can be, small enough for caches."""
+ARENA_BYTES: Final = 64_000
+"""Scratch memory of one world: twice what every contact, limit and friction row at once needs, and
+small enough that 256 worlds stay in the cache."""
 
 _TYPE = mujoco.mjtGeom
 _AXES: Final = "xyz"
