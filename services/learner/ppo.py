@@ -78,9 +78,9 @@ class PolicyOptimiser:
         critic = MLPModel(
             proto, _GROUPS, "critic", 1, cfg.hidden_dims, cfg.activation, obs_normalization=True
         )
-        # A small last layer starts every policy near "hold still" (Andrychowicz 2021, sec. 3.2).
+        # A last layer 100 times smaller: a fresh policy holds still (Andrychowicz 2021, sec. 3.2).
         with torch.no_grad():
-            actor.mlp[-1].weight.mul_(0.1)
+            actor.mlp[-1].weight.mul_(0.01)
             actor.mlp[-1].bias.zero_()
         algorithm = PPO(
             actor,
