@@ -147,7 +147,8 @@ class Narrator:
         for quantity, value in values.items():
             self._recording.curve(paths.service_path(quantity, name), value, wall)
         for rate, value in status.rates.items():
-            self._recording.curve(paths.service_path("rate", f"{name}/{rate}"), value, wall)
+            quantity = "rate" if rate.endswith("_per_s") else "other"
+            self._recording.curve(paths.service_path(quantity, f"{name}/{rate}"), value, wall)
 
     def _status_page(self) -> str:
         progress, schedule = self._progress, self._schedule

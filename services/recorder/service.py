@@ -2,12 +2,12 @@
 
 import contextlib
 import hashlib
-import json
 import os
 import shutil
 import sys
 from pathlib import Path
 
+import msgspec
 import structlog
 
 from services.recorder.config import RecorderConfig
@@ -22,6 +22,7 @@ from shared.runtime.files import MIB, atomic_write
 from shared.runtime.service import Health
 from shared.sim.model import FencingModel
 from shared.telemetry.bout import BoutDrawer, BoutRows, draw_scene
+from shared.telemetry.door import VIEWER_FILE, FrontDoor, LiveView
 from shared.telemetry.layout import training_layout
 from shared.telemetry.recording import LivePorts, Recording
 from shared.telemetry.rrd import next_recording, recordings, trim
@@ -34,7 +35,6 @@ DISK_PERIOD = 5.0
 """Seconds from one look at the free space to the next."""
 TAKE_MOST = 64
 """Messages of one topic taken in one tick, so that a flood cannot hold up the rest."""
-VIEWER_FILE = "viewer.json"
 
 log = structlog.get_logger()
 
@@ -65,8 +65,9 @@ class Recorder:
         self._counters = {"frames": 0, "frames_unshown": 0, "frames_refused": 0, "rows": 0}
         self._last_error = ""
         self._viewer: WebViewer | None = None
-        live = self._start_viewer() if cfg.live else None
+        self._door: FrontDoor | None = None
         try:
+            live = self._start_viewer() if cfg.live else None
             self._recording = self._open(live)
         except OSError as error:
             self._close_viewer()
@@ -87,12 +88,14 @@ class Recorder:
     @property
     def url(self) -> str:
         """Return the address of the live view; empty without one."""
-        return self._viewer.url if self._viewer is not None else ""
+        return self._door.url if self._door is not None else ""
 
     def tick(self) -> bool:
         """Take what has arrived and record what is due; return whether anything arrived."""
         did = self._listen()
         now = self._clock.now()
+        if self._door is not None:
+            self._door.tick()
         if now >= self._bout_due:
             self._bout_due = now + self._cfg.live_period
             self._show_bout(now)
@@ -238,10 +241,14 @@ class Recorder:
         live = LivePorts(
             bout=free_port(), curves=free_port(), bout_memory=f"{self._cfg.bout_memory_mib}MiB"
         )
-        self._viewer = WebViewer(live.urls, self._cfg.web_port, launcher=_launcher())
+        self._viewer = WebViewer(live.urls, launcher=_launcher())
+        self._door = FrontDoor(self._viewer.url, self._cfg.web_port, self._clock)
         return live
 
     def _close_viewer(self) -> None:
+        if self._door is not None:
+            self._door.close()
+            self._door = None
         if self._viewer is not None:
             self._viewer.close()
             self._viewer = None
