@@ -221,12 +221,8 @@ class Recorder:
         layout = training_layout(self._scene)
         recording = Recording(identity, file, live, layout, name=self._directory.resolve().name)
         if self._viewer is not None:
-            about = {
-                "url": self._viewer.url,
-                "pid": self._viewer.pid,
-                "sources": live and live.urls,
-            }
-            atomic_write(self._directory / VIEWER_FILE, json.dumps(about).encode())
+            view = LiveView(url=self.url, page=self._viewer.url, pid=self._viewer.pid)
+            atomic_write(self._directory / VIEWER_FILE, msgspec.json.encode(view))
         log.info("recording_opened", file=str(file or ""), url=self.url)
         return recording
 
