@@ -10,13 +10,13 @@ class LeagueConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """Seed of the run; every lease's seed follows from it."""
     iterations: int = 2
     """Iterations of phase one; in each the antagonist learns first, then the protagonist."""
-    antagonist_updates: int = 120
+    antagonist_updates: int = 100
     """Most PPO updates of the antagonist in one stage."""
-    protagonist_updates: int = 120
+    protagonist_updates: int = 150
     """Most PPO updates of the protagonist in one stage."""
     score_weights: tuple[float, ...] = (1.0,)
     """Factor of the game score in the reward, by iteration; the last one holds for the rest."""
-    shaping_weights: tuple[float, ...] = (1.0,)
+    shaping_weights: tuple[float, ...] = (0.1,)
     """Factor of the continuous reward, by iteration; the last one holds for the rest."""
     convergence_min_updates: int = 60
     """A stage is not called converged before this many updates; 0 never ends a stage early."""
@@ -24,7 +24,9 @@ class LeagueConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """Updates in each of the two adjacent windows whose mean scores are compared."""
     convergence_tolerance: float = 10.0
     """Points a bout by which the newer window must be better for the learner to go on."""
-    evaluation_bouts: int = 64
+    opponent_stochastic: bool = False
+    """Let the opponent of a training stage sample its actions instead of taking their mean."""
+    evaluation_bouts: int = 128
     """Complete bouts of each pairing of the final evaluation; 0 skips the evaluation."""
     evaluation_stochastic: bool = False
     """Sample the actions in evaluations instead of taking their mean."""

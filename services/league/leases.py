@@ -118,7 +118,9 @@ def lease_message(
         antagonist=granted.antagonist,
         protagonist=granted.protagonist,
         bouts=granted.bouts,
-        stochastic=granted.work == "train" or cfg.evaluation_stochastic,
+        stochastic=(
+            cfg.opponent_stochastic if granted.work == "train" else cfg.evaluation_stochastic
+        ),
         seed=granted.seed,
         expires_in=cfg.lease_seconds,
         window=lease_window(cfg, training_actors(state), serial=serial),

@@ -53,7 +53,7 @@ class Lease(Message, frozen=True, kw_only=True):
     bouts: int = 0
     """Bouts to play from start to end (``kind == "evaluate"``)."""
     stochastic: bool = False
-    """Sample the actions instead of taking the mean (``kind == "evaluate"``)."""
+    """Sample the actions of frozen players instead of taking their mean."""
     seed: int = 0
     expires_in: float = 0.0
     """Seconds until it lapses unless renewed."""
