@@ -12,6 +12,7 @@ import os
 import socket
 import sys
 import threading
+import webbrowser
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +23,7 @@ import structlog
 from services.jobs.settings import BUDGETS, Settings, TrainConfig
 from services.supervisor import ProcessEvent, ProcessSpec, Supervisor, service_command
 from shared.bus.base import Bus
+from shared.bus.config import BusConfig
 from shared.bus.delivery import Outbox
 from shared.clock import SystemClock
 from shared.errors import ConfigError, RiposteError
@@ -32,6 +34,7 @@ from shared.runtime.files import RunLock, atomic_write, require_free_space
 from shared.runtime.logging import configure_logging
 from shared.runtime.process import THREAD_LIMITS
 from shared.runtime.serve import run_id_of, stop_on_signals
+from shared.telemetry.door import read_live_view
 
 if TYPE_CHECKING:
     from services.jobs.dashboard import Dashboard
@@ -72,7 +75,7 @@ def main(argv: Sequence[str]) -> int:
                 if found.serial:
                     _train_serially(settings, folder, run, found.resume, stop)
                 else:
-                    _train(settings, folder, run, stop)
+                    _train(settings, folder, run, stop, view=found.view)
             except Stopped:
                 print(f"\nstopped; continue with: riposte train --resume --out {folder}")
                 return EXIT_INTERRUPTED
@@ -203,13 +206,16 @@ def processes(settings: Settings, folder: Path, run: str, endpoint: str) -> list
     return made
 
 
-def _train(settings: Settings, folder: Path, run: str, stop: threading.Event) -> None:
+def _train(
+    settings: Settings, folder: Path, run: str, stop: threading.Event, *, view: bool
+) -> None:
     """Run the processes until the schedule is done."""
     from shared.bus.zenoh import open_zenoh
 
     clock = SystemClock()
-    listen = settings.bus.listen[0] if settings.bus.connect else ""
-    endpoint = listen or f"tcp/127.0.0.1:{free_port()}"
+    # Runs side by side need a port each; a site file that names one gets that one.
+    is_named = settings.bus.listen != BusConfig().listen
+    endpoint = settings.bus.listen[0] if is_named else f"tcp/127.0.0.1:{free_port()}"
     atomic_write(
         folder / "endpoint.json", json.dumps({"connect": endpoint, "run": run}).encode()
     )
@@ -228,6 +234,9 @@ def _train(settings: Settings, folder: Path, run: str, stop: threading.Event) ->
                 if stop.is_set():
                     raise Stopped
                 watcher.tick()
+                if view and (live := read_live_view(folder)) is not None:
+                    view = False
+                    webbrowser.open(live.url)
                 bus.wait(POLL_SECONDS)
     finally:
         for event in supervisor.stop():
