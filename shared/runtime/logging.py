@@ -114,4 +114,4 @@ def _render(_logger: object, method: str, event: Event) -> tuple[tuple[Lines], d
         console += f" ({event['exception'].splitlines()[-1]})"
     level = logging.getLevelNamesMapping()[event["level"].upper()]
     first = {key: event[key] for key in _FIRST if key in event}
-    return (Lines(json.dumps(first | event, default=str), console, level),), {}
+    return (Lines(json.dumps(first | dict(event), default=str), console, level),), {}
