@@ -80,8 +80,10 @@ def distance_between_bats(
     guess on A is clamped, B answers it, and A answers B; exact because the problem is convex.
 
     Args:
-        grips_a: float64[3, ...], origin of each bat frame; ``grips_b`` likewise.
-        directions_a: float64[3, ...], unit vector along each blade; ``directions_b`` likewise.
+        grips_a: float64[3, ...], origin of each first bat's frame.
+        directions_a: float64[3, ...], unit vector along each first blade.
+        grips_b: of the second bats.
+        directions_b: of the second bats.
         bat: shape of both bats.
 
     Returns:

@@ -62,7 +62,7 @@ def is_camping_paid(camping: Ints, rules: RuleBook) -> Bools:
     too_long = camping > rules.camping_steps
     if rules.camping == "every_step":
         return too_long
-    return too_long & (camping % rules.camping_steps == 1)
+    return too_long & ((camping - 1) % rules.camping_steps == 0)
 
 
 def score_step(
@@ -79,5 +79,6 @@ def score_step(
     Returns:
         float64[N].
     """
-    attack = np.where(contact, rules.penalty, rules.point) * antagonist_in_target
-    return attack + rules.camping_award * is_camping_paid(camping, rules)
+    attack: Floats = np.where(contact, rules.penalty, rules.point) * antagonist_in_target
+    award: Floats = np.where(is_camping_paid(camping, rules), rules.camping_award, 0.0)
+    return attack + award

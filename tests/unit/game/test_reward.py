@@ -1,0 +1,45 @@
+"""Rewards by hand."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from shared.game.bout import Judgement
+from shared.game.reward import RewardConfig, reward
+
+STEP = Judgement(
+    points=np.array([1.0, -10.0]),
+    antagonist_in_target=np.array([True, True]),
+    protagonist_in_target=np.array([False, True]),
+    contact=np.array([False, True]),
+    target_distance=np.array([[0.5, -0.1], [1.0, -0.2]]),
+    bat_distance=np.array([0.5, -0.01]),
+)
+
+
+def test_the_antagonist_gets_the_score_and_its_nearness_to_the_target():
+    cfg = RewardConfig(score_scale=0.1, reach=0.5)
+    found = reward(0, STEP, 2.0, 3.0, cfg)
+    np.testing.assert_allclose(found, [0.2 + 3.0 * math.exp(-1.0), -2.0 + 3.0])
+
+
+def test_the_protagonist_gets_the_lost_score_its_guard_and_its_distance_from_the_target():
+    cfg = RewardConfig(score_scale=0.1, reach=0.5, guard_weight=0.25)
+    found = reward(1, STEP, 2.0, 4.0, cfg)
+    np.testing.assert_allclose(found, [-0.2 + 4 * (0.25 * math.exp(-1.0) + 0.75), 2.0 + 4 * 0.25])
+
+
+def test_without_shaping_only_the_score_counts():
+    broken = dataclasses.replace(STEP, target_distance=np.full((2, 2), np.nan))
+    np.testing.assert_allclose(reward(0, broken, 1.0, 0.0, RewardConfig()), [0.1, -1.0])
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("score_scale", 0.0), ("reach", -1.0), ("guard_weight", 1.5), ("guard_weight", -0.1)],
+)
+def test_a_scale_out_of_range_is_refused_by_name(field: str, value: float):
+    with pytest.raises(ValueError, match=field):
+        RewardConfig(**{field: value})
