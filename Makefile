@@ -54,7 +54,7 @@ format: $(STAMP) ## rewrite the files as `make check` wants them
 	@$(BIN)/ruff format .
 	@$(BIN)/ruff check --fix .
 
-bench: $(STAMP) ## measure, and add a row to benchmarks/RESULTS.md
+bench: $(STAMP) ## list the benchmarks; make bench ARGS='actor --write' measures one
 	@$(BIN)/riposte bench $(ARGS)
 
 docs: $(STAMP) ## renew the generated parts of docs/ and deploy/
