@@ -5,11 +5,8 @@ import sys
 import threading
 from collections.abc import Sequence
 
-import msgspec
-
 from services.router.service import run
 from shared.bus.config import BusConfig
-from shared.errors import ConfigError
 from shared.runtime.serve import ServeArgs, serve_plain
 
 
@@ -21,14 +18,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     def body(args: ServeArgs, stop: threading.Event) -> None:
         cfg = args.section("bus", BusConfig)
-        try:
-            if own.listen:
-                cfg = msgspec.structs.replace(cfg, listen=tuple(own.listen))
-            if args.connect:
-                cfg = msgspec.structs.replace(cfg, connect=args.connect)
-        except ValueError as error:
-            raise ConfigError(str(error)) from error
-        run(cfg, stop)
+        run(cfg.with_endpoints(connect=args.connect, listen=tuple(own.listen)), stop)
 
     return serve_plain("router", body, rest)
 

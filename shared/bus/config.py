@@ -6,6 +6,7 @@ from typing import Any
 
 import msgspec
 
+from shared.errors import ConfigError
 from shared.messages.topics import MIB, SERVICES, TOPICS
 
 MAX_MESSAGE = max(
@@ -69,6 +70,21 @@ class BusConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
             value = getattr(self, name)
             if not 1 <= value <= 65536:
                 raise ValueError(f"{name} ({value}) must be between 1 and 65536")
+
+    def with_endpoints(
+        self, connect: tuple[str, ...] = (), listen: tuple[str, ...] = ()
+    ) -> "BusConfig":
+        """Return the same with other endpoints where some are given, as on a command line.
+
+        Raises:
+            ConfigError: one of them is not an endpoint.
+        """
+        try:
+            return msgspec.structs.replace(
+                self, connect=connect or self.connect, listen=listen or self.listen
+            )
+        except ValueError as error:
+            raise ConfigError(str(error)) from error
 
     @property
     def routers(self) -> tuple[str, ...]:

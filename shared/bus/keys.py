@@ -3,7 +3,7 @@
 import re
 import string
 
-_CHUNK = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
+_CHUNK = re.compile(r"[A-Za-z0-9._-]{1,255}")
 
 
 def key_of(template: str, fields: dict[str, str]) -> str:
@@ -45,10 +45,7 @@ def check_chunk(what: str, value: str) -> None:
         ValueError: naming the value.
     """
     if not _CHUNK.fullmatch(value):
-        raise ValueError(
-            f"{what} {value!r} must be 1 to 64 letters, digits, '.', '_' or '-', "
-            "beginning with a letter or digit"
-        )
+        raise ValueError(f"{what} {value!r} must be 1 to 255 letters, digits, '.', '_' or '-'")
 
 
 def matches(pattern: str, key: str) -> bool:

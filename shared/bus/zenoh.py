@@ -1,4 +1,4 @@
-# pyright: basic
+# pyright: basic, reportMissingModuleSource=false
 """The bus between processes, over Zenoh; the only door to that library.
 
 Every process is a Zenoh client of one router. The library's threads only put what arrives into
@@ -20,26 +20,31 @@ import contextlib
 import secrets
 import threading
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import structlog
 import zenoh
 from zenoh.handlers import Callback
 
+from shared.bus.arrivals import take_answer, take_request, take_value
 from shared.bus.base import NoAnswer, Refused
 from shared.bus.config import BusConfig, client_json, router_json
 from shared.bus.counters import Counters
-from shared.bus.endpoints import MAX_REFUSAL, Answer, Host, Present, Requests, Values, too_long
+from shared.bus.endpoints import Answer, Host, Present, Requests, Values, too_long
 from shared.bus.keys import check_chunk, key_of, pattern_of
+from shared.bus.latest import LatestSent, stamp_of
 from shared.bus.reopening import Reopening
 from shared.clock import Clock
 from shared.errors import BusError, ConfigError, MessageError
 from shared.messages.message import Message
 from shared.messages.topics import Qos, Service, Topic
-from shared.messages.wire import decode, encode
+from shared.messages.wire import encode
 
 In = TypeVar("In", bound=Message)
 Out = TypeVar("Out", bound=Message)
+
+Declare: TypeAlias = Callable[[zenoh.Session], Any]
+"""Declares something in a session; returns the library's object."""
 
 PREFIX = "riposte/v1"
 UPKEEP_SECONDS = 0.25
@@ -111,7 +116,7 @@ def open_router(cfg: BusConfig) -> Router:
         raise ConfigError(
             "[bus] listen is empty: a router needs an endpoint, as tcp/127.0.0.1:7447"
         )
-    zenoh.init_log_from_env_or("off")
+    zenoh.init_log_from_env_or("off")  # it would repeat our one line in twenty of its own
     try:
         return Router(_open(router_json(cfg)), cfg.listen)
     except zenoh.ZError as error:
@@ -123,12 +128,6 @@ def open_router(cfg: BusConfig) -> Router:
                 "or give another endpoint with --listen"
             ) from error
         raise ConfigError(f"cannot listen on {where}: {text.split(' at /')[0]}") from error
-
-
-class _Declared(Protocol):
-    """Something a new session must declare again; returns the library's object."""
-
-    def __call__(self, session: zenoh.Session) -> Any: ...
 
 
 class ZenohBus:
@@ -149,9 +148,9 @@ class ZenohBus:
         )
         self._session: zenoh.Session | None = session
         self._opening: Reopening[zenoh.Session] | None = None
-        self._declared: dict[object, tuple[_Declared, Any]] = {}
+        self._declared: dict[object, tuple[Declare, Any]] = {}
         self._present: dict[str, Present] = {}
-        self._latest: dict[str, tuple[bytes, bytes, float]] = {}
+        self._latest = LatestSent(cfg.resend_seconds - UPKEEP_SECONDS / 2)
         self._published = 0
         self._seen_at = clock.now()
         self._upkeep_at = 0.0
@@ -170,17 +169,19 @@ class ZenohBus:
             self._counts.add("refused_messages")
             log.warning("value_refused", reason=too_long(len(payload), key, topic.max_bytes))
             return
-        stamp = f"{self.boot}:{self._published}".encode()
+        stamp = stamp_of(self.boot, self._published)
         self._published += 1
         if topic.qos is Qos.LATEST:
-            self._latest[key] = (payload, stamp, self._clock.now())
+            self._latest.keep(key, payload, stamp, self._clock.now())
         self._put(key, payload, stamp, topic.qos)
 
     def subscribe(self, topic: Topic[Out], **fields: str) -> Values[Out]:
         """Listen; a LATEST topic's present values are there within a second."""
         pattern = self._prefix + pattern_of(topic.key, fields)
         values = Values(self._host, topic, pattern, self._undeclare)
-        callback = self._guard(lambda sample: _take_sample(values, sample))
+        callback = self._guard(
+            lambda it: take_value(values, str(it.key_expr), it.payload, it.attachment)
+        )
         self._declare(values, lambda session: session.declare_subscriber(pattern, callback))
         return values
 
@@ -188,7 +189,7 @@ class ZenohBus:
         """Offer a service."""
         key = self._prefix + key_of(service.key, fields)
         inbox = Requests(self._host, service, key, self._undeclare)
-        callback = self._guard(lambda query: _take_query(inbox, query))
+        callback = self._guard(lambda query: take_request(inbox, query.payload, _Path(query, key)))
         self._declare(
             inbox, lambda session: session.declare_queryable(key, callback, complete=True)
         )
@@ -209,13 +210,18 @@ class ZenohBus:
         if self._session is None:
             answer.on_arrival(NoAnswer(f"{self._without_router()} to carry {key}"))
             return answer
-        callback = self._guard(lambda reply: _take_reply(answer, reply), answer.on_end)
+        callback = self._guard(
+            lambda reply: take_answer(
+                answer, reply.ok and reply.ok.payload, reply.err and reply.err.payload
+            ),
+            answer.on_end,
+        )
         try:
             self._session.get(
                 self._prefix + key,
                 callback,
                 payload=payload,
-                timeout=timeout,
+                timeout=max(timeout, 0.001),
                 target=zenoh.QueryTarget.BEST_MATCHING,
                 consolidation=zenoh.ConsolidationMode.NONE,
                 congestion_control=zenoh.CongestionControl.BLOCK,
@@ -240,7 +246,7 @@ class ZenohBus:
             check_chunk("role", role)
             present = self._present[role] = Present()
             pattern = f"{self._prefix}alive/{role}/*/*"
-            callback = self._guard(lambda sample: _take_token(present, sample))
+            callback = self._guard(lambda token: _note_token(present, token))
             self._declare(
                 present,
                 lambda session: session.liveliness().declare_subscriber(
@@ -261,7 +267,8 @@ class ZenohBus:
             if now >= self._upkeep_at:
                 self._upkeep_at = now + UPKEEP_SECONDS
                 self._keep_session(now)
-                self._resend(now)
+                for sent in self._latest.due(now):
+                    self._put(sent.key, sent.payload, sent.stamp, Qos.LATEST)
             if self._news.is_set():
                 self._news.clear()
                 return True
@@ -308,13 +315,7 @@ class ZenohBus:
             )
             self._counts.sent(len(payload))
 
-    def _resend(self, now: float) -> None:
-        for key, (payload, stamp, at) in self._latest.items():
-            if now - at >= self._cfg.resend_seconds - UPKEEP_SECONDS / 2:
-                self._latest[key] = (payload, stamp, now)
-                self._put(key, payload, stamp, Qos.LATEST)
-
-    def _declare(self, owner: object, declare: _Declared) -> None:
+    def _declare(self, owner: object, declare: Declare) -> None:
         """Declare something now and in every later session, until its owner is closed."""
         entity = None
         if self._session is not None:
@@ -355,8 +356,8 @@ class ZenohBus:
             present.clear()
         for owner, (declare, _) in list(self._declared.items()):
             self._declare(owner, declare)
-        for key, (payload, stamp, _) in self._latest.items():
-            self._put(key, payload, stamp, Qos.LATEST)
+        for sent in self._latest.all():
+            self._put(sent.key, sent.payload, sent.stamp, Qos.LATEST)
         self._news.set()
         log.info("session_restored", routers=", ".join(self._cfg.routers))
 
@@ -384,45 +385,9 @@ class _Path:
         self._query.drop()
 
 
-def _take_sample(values: Values[Any], sample: zenoh.Sample) -> None:
-    key = str(sample.key_expr)
-    size = len(sample.payload)
-    if size > values.max_bytes:
-        raise MessageError(too_long(size, key, values.max_bytes))
-    stamp = sample.attachment
-    if stamp is None or len(stamp) > 64:
-        raise MessageError(f"a value on {key} has no stamp")
-    boot, _, count = stamp.to_bytes().decode("ascii", "replace").partition(":")
-    if not (count.isascii() and count.isdigit()):
-        raise MessageError(f"a value on {key} has the stamp {boot!r}:{count!r}")
-    values.offer(key, boot, int(count), sample.payload.to_bytes())
-
-
-def _take_token(present: Present, sample: zenoh.Sample) -> None:
-    token = str(sample.key_expr)
-    present.on_token(token, token.split("/")[-2], sample.kind == zenoh.SampleKind.PUT)
-
-
-def _take_query(inbox: Requests[Any, Any], query: zenoh.Query) -> None:
-    path = _Path(query, inbox.key)
-    payload = query.payload
-    if payload is None:
-        path.refuse(Refused(f"a request on {inbox.key} has no payload"))
-    elif inbox.accepts(len(payload), path):
-        inbox.offer(payload.to_bytes(), path)
-
-
-def _take_reply(answer: Answer[Any], reply: zenoh.Reply) -> None:
-    if reply.ok is not None:
-        size = len(reply.ok.payload)
-        if size > answer.max_bytes:
-            answer.on_arrival(Refused(f"the answer is {size} B long, over {answer.max_bytes} B"))
-        else:
-            answer.on_arrival(reply.ok.payload.to_bytes())
-    elif reply.err is not None and len(reply.err.payload) <= MAX_REFUSAL:
-        # The library's own errors, such as a timeout, are text; the end that follows tells.
-        with contextlib.suppress(MessageError):
-            answer.on_arrival(decode(Refused, reply.err.payload.to_bytes(), MAX_REFUSAL))
+def _note_token(present: Present, token: zenoh.Sample) -> None:
+    key = str(token.key_expr)
+    present.on_token(key, key.split("/")[-2], token.kind == zenoh.SampleKind.PUT)
 
 
 def _open(config: str) -> zenoh.Session:

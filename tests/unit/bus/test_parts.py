@@ -8,9 +8,11 @@ import pytest
 
 from shared.bus.config import MAX_MESSAGE, BusConfig, client_json, router_json
 from shared.bus.keys import key_of, matches, pattern_of
+from shared.bus.latest import LatestSent, read_stamp, stamp_of
 from shared.bus.memory import MemoryHub
 from shared.bus.queues import MAX_KEYS, Fifo, Newest
 from shared.clock import ManualClock
+from shared.errors import ConfigError, MessageError
 from shared.messages.topics import SERVICES, TOPICS
 
 
@@ -43,6 +45,31 @@ def test_newest_is_bounded_in_keys() -> None:
     assert not newest.offer("one more", "b", 0, 0)
 
 
+def test_a_latest_value_is_due_again_after_its_period() -> None:
+    latest = LatestSent(period=1.0)
+    latest.keep("a", b"old", stamp_of("b0", 0), now=0.0)
+    latest.keep("a", b"new", stamp_of("b0", 1), now=0.5)
+    assert latest.due(1.4) == []
+    assert [sent.payload for sent in latest.due(1.5)] == [b"new"]
+    assert latest.due(2.4) == []
+    assert len(latest.due(2.5)) == len(latest.all()) == 1
+
+
+@pytest.mark.parametrize("stamp", [b"", b"b0", b"b0:", b":1", b"b0:-1", b"b0:1x", b"b" * 99])
+def test_what_is_not_a_stamp_is_refused(stamp: bytes) -> None:
+    assert read_stamp(stamp_of("b0", 12)) == ("b0", 12)
+    with pytest.raises(MessageError, match="expected boot:count"):
+        read_stamp(stamp)
+
+
+def test_endpoints_of_a_command_line_are_checked_as_those_of_a_file() -> None:
+    cfg = BusConfig().with_endpoints(connect=("tcp/10.0.0.1:1",), listen=("tcp/[::1]:2",))
+    assert (cfg.connect, cfg.listen) == (("tcp/10.0.0.1:1",), ("tcp/[::1]:2",))
+    assert BusConfig().with_endpoints() == BusConfig()
+    with pytest.raises(ConfigError, match="connect has 'nowhere', expected an endpoint"):
+        BusConfig().with_endpoints(connect=("nowhere",))
+
+
 def test_keys_are_filled_in_completely() -> None:
     assert key_of("learner/{agent}/policy", {"agent": "antagonist"}) == "learner/antagonist/policy"
     assert pattern_of("status/{role}/{name}", {"role": "actor"}) == "status/actor/*"
@@ -56,9 +83,9 @@ def test_keys_are_filled_in_completely() -> None:
     [
         ({}, "needs agent"),
         ({"agent": "a", "name": "b"}, "has no field name"),
-        ({"agent": "a/b"}, "must be 1 to 64 letters"),
-        ({"agent": "*"}, "must be 1 to 64 letters"),
-        ({"agent": ""}, "must be 1 to 64 letters"),
+        ({"agent": "a/b"}, "must be 1 to 255 letters"),
+        ({"agent": "*"}, "must be 1 to 255 letters"),
+        ({"agent": ""}, "must be 1 to 255 letters"),
     ],
 )
 def test_a_key_that_cannot_be_is_refused(fields: dict[str, str], what: str) -> None:
