@@ -12,7 +12,7 @@ class LeagueConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """Iterations of phase one; in each the antagonist learns first, then the protagonist."""
     antagonist_updates: int = 100
     """Most PPO updates of the antagonist in one stage."""
-    protagonist_updates: int = 150
+    protagonist_updates: int = 120
     """Most PPO updates of the protagonist in one stage."""
     score_weights: tuple[float, ...] = (1.0,)
     """Factor of the game score in the reward, by iteration; the last one holds for the rest."""
@@ -24,8 +24,9 @@ class LeagueConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """Updates in each of the two adjacent windows whose mean scores are compared."""
     convergence_tolerance: float = 10.0
     """Points a bout by which the newer window must be better for the learner to go on."""
-    opponent_stochastic: bool = False
-    """Let the opponent of a training stage sample its actions instead of taking their mean."""
+    opponent_stochastic: bool = True
+    """Let the opponent of a training stage sample its actions instead of taking their mean: one
+    that always moves alike teaches nothing about any other."""
     evaluation_bouts: int = 128
     """Complete bouts of each pairing of the final evaluation; 0 skips the evaluation."""
     evaluation_stochastic: bool = False
