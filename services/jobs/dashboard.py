@@ -18,6 +18,7 @@ from rich.rule import Rule
 from rich.table import Table
 from rich.text import Text
 
+from services.jobs.words import clock_text
 from shared.bus.base import Bus
 from shared.clock import Clock
 from shared.messages.live import Progress, ServiceStatus
@@ -251,15 +252,6 @@ def sparkline(values: list[tuple[str, float]], width: int) -> Text:
         block = BLOCKS[min(len(BLOCKS) - 1, int((value - low) / span * len(BLOCKS)))]
         text.append(block, style=COLOURS.get(agent, ""))
     return text
-
-
-def clock_text(seconds: float) -> str:
-    """Return a duration as ``4:07`` or ``1:02:33``."""
-    whole = max(0, round(seconds))
-    hours, minutes = divmod(whole // 60, 60)
-    if hours:
-        return f"{hours}:{minutes:02d}:{whole % 60:02d}"
-    return f"{minutes}:{whole % 60:02d}"
 
 
 def _progress(state: State) -> RenderableType:
