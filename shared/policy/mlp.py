@@ -64,7 +64,9 @@ class GaussianPolicy:
             if self.weights.activation == "tanh":
                 np.tanh(hidden, out=hidden)
             else:
-                hidden = np.expm1(np.minimum(hidden, 0.0)) + np.maximum(hidden, 0.0)
+                below: Floats = np.expm1(np.minimum(hidden, np.float32(0.0)))
+                np.maximum(hidden, np.float32(0.0), out=hidden)
+                hidden += below
         mean: Floats = hidden @ last_weight
         mean += last_bias
         return mean
@@ -76,7 +78,9 @@ class GaussianPolicy:
             mean: float32[..., action_dim].
             noise: float32[..., action_dim], standard normal.
         """
-        return mean + self.std * noise
+        actions: Floats = np.multiply(self.std, noise)
+        actions += mean
+        return actions
 
     def log_prob(self, noise: Floats) -> Floats:
         """Return the log density of the actions drawn with this standard normal noise.

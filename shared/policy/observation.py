@@ -71,7 +71,9 @@ class ObservationEncoder:
             shifts.append(np.concatenate([shift, shift]))
         self._observers = len(yaws)
         columns = np.concatenate(blocks, axis=1)
-        starts = 2 * BAT_DIM * np.arange(self._observers)[:, None] + [_QUATERNION, BAT_DIM + _QUATERNION]
+        starts = 2 * BAT_DIM * np.arange(self._observers)[:, None] + np.array(
+            [_QUATERNION, BAT_DIM + _QUATERNION]
+        )
         signs = [
             columns[:, start : start + 4] @ reference
             for start, reference in zip(
@@ -93,9 +95,10 @@ class ObservationEncoder:
         """
         mapped = bats.astype(np.float32) @ self._map
         width = 2 * BAT_DIM
-        numbers, products = mapped[:, : self._observers * width], mapped[:, self._observers * width :]
+        numbers, products = np.split(mapped, [self._observers * width], axis=1)
         numbers += self._shift
-        numbers[:, self._quaternions] *= np.repeat(np.copysign(np.float32(1.0), products), 4, axis=1)
+        signs = np.copysign(np.float32(1.0), products)
+        numbers[:, self._quaternions] *= np.repeat(signs, 4, axis=1)
         for observer, out in enumerate(outs):
             out[:, :width] = numbers[:, observer * width : (observer + 1) * width]
             out[:, width] = seconds

@@ -6,8 +6,9 @@ is always the same bytes. A reader checks the card before it looks at a weight.
 
 import dataclasses
 import hashlib
+import itertools
 import json
-from typing import Any, cast
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -25,7 +26,10 @@ from shared.policy.schema import schema_hash
 SCHEMA = 1
 MAX_BYTES = 4 * 1024 * 1024
 _MAX_HEADER = 64 * 1024
+_MAX_LOG_STD = 10.0
 _REFERENCE_PREFIX = "sha256:"
+_UNDECODABLE = (msgspec.MsgspecError, UnicodeDecodeError, RecursionError)
+"""What JSON from outside may raise."""
 
 
 class Card(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -112,7 +116,8 @@ class Snapshot:
 
 def normaliser_hash(obs_mean: NDArray[np.float32], obs_std: NDArray[np.float32]) -> str:
     """Return 16 hex digits that stand for a normaliser's numbers."""
-    return schema_hash([obs_mean.astype("<f4").tobytes().hex(), obs_std.astype("<f4").tobytes().hex()])
+    numbers = (obs_mean, obs_std)
+    return schema_hash([values.astype("<f4").tobytes().hex() for values in numbers])
 
 
 def reference_of(digest: str) -> str:
@@ -168,7 +173,7 @@ def unpack(payload: bytes, digest: str | None = None) -> Snapshot:
         raise SnapshotError(f"snapshot is damaged: its hash is {found[:12]}, not {digest[:12]}")
     card = _read_card(payload)
     try:
-        tensors = cast("dict[str, NDArray[Any]]", load(payload))
+        tensors = load(payload)
     except (SafetensorError, ValueError, KeyError, TypeError) as error:
         raise SnapshotError(f"snapshot is unreadable: {error}") from None
     return Snapshot(card, _read_weights(card, tensors), payload, found)
@@ -183,13 +188,13 @@ def _read_card(payload: bytes) -> Card:
         header = msgspec.json.decode(payload[8 : 8 + length], type=dict[str, Any])
         text = header["__metadata__"]["card"]
         version = msgspec.json.decode(text, type=dict[str, Any]).get("schema")
-    except (msgspec.MsgspecError, KeyError, TypeError) as error:
+    except (*_UNDECODABLE, KeyError, TypeError) as error:
         raise SnapshotError(f"snapshot is unreadable: no card in its header ({error})") from None
     if version != SCHEMA:
         raise SnapshotError(f"snapshot has schema {version}, this build reads schema {SCHEMA}")
     try:
         return msgspec.json.decode(text, type=Card)
-    except msgspec.MsgspecError as error:
+    except _UNDECODABLE as error:
         raise SnapshotError(f"snapshot card is invalid: {error}") from None
 
 
@@ -201,7 +206,7 @@ def _read_weights(card: Card, tensors: dict[str, NDArray[Any]]) -> PolicyWeights
         "normaliser.std": (OBS_DIM,),
         "log_std": (ACTION_DIM,),
     }
-    for index, (inputs, outputs) in enumerate(zip(sizes[:-1], sizes[1:], strict=True)):
+    for index, (inputs, outputs) in enumerate(itertools.pairwise(sizes)):
         shapes[f"layers.{index}.weight"] = (outputs, inputs)
         shapes[f"layers.{index}.bias"] = (outputs,)
     if set(tensors) != set(shapes):
@@ -216,6 +221,10 @@ def _read_weights(card: Card, tensors: dict[str, NDArray[Any]]) -> PolicyWeights
             )
         if not np.isfinite(value).all():
             raise SnapshotError(f"snapshot tensor {name} has a value that is not finite")
+    if tensors["normaliser.std"].min() < 0.0:
+        raise SnapshotError("snapshot tensor normaliser.std has a value below zero")
+    if np.abs(tensors["log_std"]).max() > _MAX_LOG_STD:
+        raise SnapshotError(f"snapshot tensor log_std has a value beyond +-{_MAX_LOG_STD:g}")
     weights = PolicyWeights(
         obs_mean=tensors["normaliser.mean"],
         obs_std=tensors["normaliser.std"],

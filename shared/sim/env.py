@@ -40,7 +40,8 @@ class FencingEnv:
         self.rules = rules
         self.num_envs = num_envs
         self.batch = FencingBatch(model, num_envs, num_threads)
-        centre = tuple(float(x) for x in model.target_centre)
+        x, y, z = (float(number) for number in model.target_centre)
+        centre = (x, y, z)
         self.scores = Scoreboard(
             num_envs,
             rules,
@@ -62,7 +63,7 @@ class FencingEnv:
             antagonist: float32[N, 27], written.
             protagonist: float32[N, 27], written.
         """
-        seconds = self.scores.step * self.model.cfg.control_timestep
+        seconds: Floats = self.scores.step * np.float64(self.model.cfg.control_timestep)
         bats = self._bats.reshape(self.num_envs, 2 * BAT_DIM)
         self._encoder.encode(bats, seconds, (antagonist, protagonist))
 

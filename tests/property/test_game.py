@@ -42,7 +42,10 @@ def slow_distances(grips: Floats, quaternions: Floats) -> tuple[list[float], flo
     """Of one world: both bats to the target, and to each other."""
     blades = [
         literal.end_points(
-            tuple(grips[:, side]), literal.rotated_x(tuple(quaternions[:, side])), BAT.back, BAT.front
+            tuple(grips[:, side]),
+            literal.rotated_x(tuple(quaternions[:, side])),
+            BAT.back,
+            BAT.front,
         )
         for side in (0, 1)
     ]  # fmt: skip
