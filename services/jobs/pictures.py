@@ -139,12 +139,18 @@ def choose(moments: list[Moment]) -> list[Moment]:
         [m for m in late if m.contact],
         [m for m in late if m.in_target[1] and not m.in_target[0]],
     )
-    chosen = {found[len(found) // 2].step: found[len(found) // 2] for found in wanted if found}
-    for k in range(MOMENTS):
-        if len(chosen) < MOMENTS and late:
-            moment = late[(2 * k + 1) * len(late) // (2 * MOMENTS)]
-            chosen.setdefault(moment.step, moment)
-    return [chosen[step] for step in sorted(chosen)]
+    chosen: list[Moment] = []
+    for found in (*(w for w in wanted if w), *[late] * MOMENTS):
+        if found and len(chosen) < MOMENTS:
+            chosen.append(_farthest(found, chosen))
+    return sorted(chosen, key=lambda moment: moment.step)
+
+
+def _farthest(found: list[Moment], chosen: list[Moment]) -> Moment:
+    """Return the moment that is farthest in time from those chosen; the middle one at first."""
+    if not chosen:
+        return found[len(found) // 2]
+    return max(found, key=lambda m: min(abs(m.step - other.step) for other in chosen))
 
 
 def caption(moment: Moment, control_timestep: float) -> str:

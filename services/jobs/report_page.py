@@ -211,7 +211,9 @@ def _pictures(pictures: Sequence[Picture]) -> Node:
         for picture in pictures
     ]
     words = "One bout between the last two policies, played again for this page."
-    return html.section("The trained pair at play", tag("p", words), figures)
+    return html.section(
+        "The trained pair at play", tag("p", words), tag("div", figures, class_="pictures")
+    )
 
 
 def _health(summary: Summary, panels: Sequence[Panel]) -> Node:

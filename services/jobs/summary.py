@@ -23,7 +23,7 @@ RECOVERS_GOAL = 1000.0
 """Points a bout that the antagonist trained after must win back from that protagonist."""
 CURVE_BINS = 40
 """Points of one stage's curve, at most."""
-BIN_BOUTS = 32
+BIN_BOUTS = 12
 """Bouts in one point of the curve, at least."""
 
 
@@ -277,7 +277,7 @@ def _stage(
         index=record.stage.index,
         iteration=record.stage.iteration,
         agent=record.stage.agent,
-        opponent=state.player_label(record.stage.opponent),
+        opponent=_label(state, record.stage.opponent),
         updates=record.updates,
         max_updates=record.stage.max_updates,
         samples=record.samples,
@@ -322,8 +322,8 @@ def _meeting(
     camping_points = rules.camping_award * sum(record.camping_steps) / bouts
     moved = abs(attack_points) + abs(penalty_points) + abs(camping_points)
     return Meeting(
-        antagonist=state.player_label(record.antagonist),
-        protagonist=state.player_label(record.protagonist),
+        antagonist=_label(state, record.antagonist),
+        protagonist=_label(state, record.protagonist),
         antagonist_player=record.antagonist,
         protagonist_player=record.protagonist,
         bouts=record.done,
@@ -383,6 +383,14 @@ def _headline_pair(differences: Sequence[Difference]) -> tuple[Difference, ...]:
     lowered = [d.iteration for d in differences if d.kind == "lowers"]
     wanted = max(recovered or lowered, default=0)
     return tuple(d for d in differences if d.iteration == wanted)
+
+
+def _label(state: RunState, player: str) -> str:
+    """Return a player's name; who has not learned yet is called that."""
+    for agent, versions in state.versions.items():
+        if 0 in versions and versions[0].ref == player:
+            return f"untrained {agent}"
+    return state.player_label(player)
 
 
 def _score(found: Interval | None) -> Score | None:

@@ -17,6 +17,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
+FEW_POINTS = 12
+"""A curve of at most this many points has them marked."""
 COLOURS = {"antagonist": "#d9532c", "protagonist": "#3576c4"}
 INK, SOFT, GRID = "#010203", "#040506", "#070809"
 """Stand-ins that ``_svg`` replaces by the page's variables."""
@@ -93,7 +95,13 @@ def learning_curve(curves: Sequence[StageCurve], x_label: str) -> str:
             colour = COLOURS.get(curve.agent, INK)
             axes.axvspan(curve.start, curve.end, color=colour, alpha=0.06, linewidth=0)
             axes.fill_between(curve.x, curve.low, curve.high, color=colour, alpha=0.22, linewidth=0)
-            axes.plot(curve.x, curve.mean, color=colour, linewidth=1.8)
+            few = len(curve.x) <= FEW_POINTS
+            axes.plot(
+                curve.x, curve.mean, color=colour, linewidth=1.8, marker="o" if few else None,
+                markersize=4,
+            )  # fmt: skip
+            if len(curve.x) == 1:
+                axes.vlines(curve.x, curve.low, curve.high, color=colour, alpha=0.5)
             axes.text(
                 (curve.start + curve.end) / 2,
                 1.02,

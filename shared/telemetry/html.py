@@ -37,6 +37,9 @@ figcaption, caption { text-align: left; margin-top: .4em; max-width: 100ch; }
 figure { margin: 1em 0 1.4em; }
 figure svg, figure img { width: 100%; height: auto; display: block; }
 figure img { border-radius: 10px; }
+.pictures { display: grid; grid-template-columns: 1fr 1fr; gap: 0 18px; }
+.pictures figure:first-child { grid-column: 1 / -1; }
+.pictures figure { margin: .5em 0; }
 .tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(165px, 1fr)); gap: 12px;
   margin: 1.6em 0; }
 .tile { background: var(--card); border: 1px solid var(--line); border-radius: 10px;
@@ -58,7 +61,7 @@ table.heat { width: auto; min-width: 60%; border-collapse: separate; border-spac
 table.heat td { border: 0; border-radius: 8px; padding: 10px 14px; text-align: center;
   min-width: 128px; }
 table.heat td b { font-size: 1.1rem; display: block; }
-table.heat th { border: 0; padding: 6px 10px; }
+table.heat th { border: 0; padding: 6px 10px; vertical-align: middle; }
 code, pre { font: .85rem/1.5 ui-monospace, "SF Mono", Menlo, "DejaVu Sans Mono", monospace; }
 pre { background: var(--card); border: 1px solid var(--line); border-radius: 8px;
   padding: 12px 14px; overflow-x: auto; }

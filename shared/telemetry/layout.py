@@ -79,7 +79,12 @@ def _learning() -> Any:
             plot_legend=rrb.PlotLegend(visible=False),
         ),
         rrb.Horizontal(
-            _plot(f"{paths.TRAINING}/explained_variance", "Explained variance", "RightBottom"),
+            _plot(
+                f"{paths.TRAINING}/explained_variance",
+                "Explained variance",
+                "RightBottom",
+                axis_y=rrb.ScalarAxis(range=(-0.2, 1.0)),
+            ),
             _plot(f"{paths.TRAINING}/approx_kl", "KL per update"),
         ),
         rrb.Horizontal(
