@@ -1,4 +1,4 @@
-"""`riposte watch [RUN]`: the live view of a run that goes on, or the recording of one that ended."""
+"""`riposte watch [RUN]`: the live view of a run that goes on, or the recording of one ended."""
 
 import argparse
 import contextlib
