@@ -49,11 +49,14 @@ def bounded_offset(actions: Floats, cfg: ActionConfig) -> Floats:
         float64[..., 6, N]: translation (m) and rotation vector (rad).
     """
     vectors = actions.reshape(*actions.shape[:-2], 2, 3, actions.shape[-1])
-    x, y, z = np.moveaxis(vectors, -2, 0)
-    lengths = np.sqrt(x * x + y * y + z * z)
     bounds = np.array([[cfg.offset_bound_m], [cfg.offset_bound_rad]])
-    scale = bounds / np.maximum(lengths, 1.0)
+    scale = bounds / np.maximum(_lengths(vectors), 1.0)
     return (vectors * scale[..., None, :]).reshape(actions.shape)
+
+
+def _lengths(vectors: Floats) -> Floats:
+    """Return float64[..., N], the lengths of float64[..., 3, N]."""
+    return np.sqrt(np.add.reduce(vectors * vectors, axis=-2))
 
 
 def desired_pose(offsets: Floats, tools: Floats) -> Floats:
@@ -67,15 +70,15 @@ def desired_pose(offsets: Floats, tools: Floats) -> Floats:
         float64[..., 7, N].
     """
     out = np.empty_like(tools)
-    out[..., :3, :] = tools[..., :3, :] + offsets[..., :3, :]
+    np.add(tools[..., :3, :], offsets[..., :3, :], out=out[..., :3, :])
     half = 0.5 * offsets[..., 3:, :]
-    b, c, d = np.moveaxis(half, -2, 0)
-    angle = np.sqrt(b * b + c * c + d * d)
+    angle = _lengths(half)
     sine = np.sin(angle)
     a = np.sqrt(1.0 - sine * sine)  # half a turn is never reached: the cosine is positive
     # The floor keeps 0 / 0 out; half is 0 there anyway.
     half *= (sine / np.maximum(angle, 1e-12))[..., None, :]
-    w, x, y, z = np.moveaxis(tools[..., 3:, :], -2, 0)
+    b, c, d = (half[..., i, :] for i in range(3))
+    w, x, y, z = (tools[..., i, :] for i in range(3, 7))
     out[..., 3, :] = a * w - b * x - c * y - d * z
     out[..., 4, :] = a * x + b * w + c * z - d * y
     out[..., 5, :] = a * y - b * z + c * w + d * x

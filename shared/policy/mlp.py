@@ -55,7 +55,7 @@ class GaussianPolicy:
         Returns:
             float32[N, action_dim].
         """
-        hidden = obs - self.weights.obs_mean
+        hidden: Floats = np.subtract(obs, self.weights.obs_mean)
         hidden *= self._scale
         *body, (last_weight, last_bias) = self._layers
         for weight, bias in body:

@@ -82,7 +82,6 @@ class ObservationEncoder:
         ]
         self._map = np.concatenate([columns, np.stack(signs, axis=1)], axis=1).astype(np.float32)
         self._shift = np.concatenate(shifts).astype(np.float32)
-        self._quaternions = (starts.ravel()[:, None] + np.arange(4)).ravel()
 
     def encode(self, bats: Floats, seconds: Floats, outs: Sequence[Observations]) -> None:
         """Write what each observer sees.
@@ -93,12 +92,13 @@ class ObservationEncoder:
             seconds: float64[N], game time.
             outs: float32[N, 27] for each observer.
         """
-        mapped = bats.astype(np.float32) @ self._map
         width = 2 * BAT_DIM
-        numbers, products = np.split(mapped, [self._observers * width], axis=1)
+        split = self._observers * width
+        mapped = bats.astype(np.float32) @ self._map
+        numbers, products = mapped[:, :split], mapped[:, split:]
         numbers += self._shift
-        signs = np.copysign(np.float32(1.0), products)
-        numbers[:, self._quaternions] *= np.repeat(signs, 4, axis=1)
+        quaternions = numbers.reshape(len(bats), -1, BAT_DIM)[:, :, _QUATERNION : _QUATERNION + 4]
+        quaternions *= np.copysign(np.float32(1.0), products)[:, :, None]
         for observer, out in enumerate(outs):
             out[:, :width] = numbers[:, observer * width : (observer + 1) * width]
             out[:, width] = seconds
