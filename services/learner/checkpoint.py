@@ -69,7 +69,7 @@ class CheckpointStore:
 
     def versions(self) -> list[int]:
         """Return the versions on disk, newest first."""
-        names = self._folder.glob("checkpoint-????????.safetensors")
+        names = self._folder.glob(f"checkpoint-{'[0-9]' * 8}.safetensors")
         return sorted((int(p.stem.removeprefix("checkpoint-")) for p in names), reverse=True)
 
     def save(self, meta: Meta, tensors: dict[str, torch.Tensor]) -> None:
@@ -117,7 +117,7 @@ class CheckpointStore:
                     f"expected {wanted}"
                 )
         if _digest(arrays) != meta.tensors:
-            raise CheckpointError(f"checkpoint {path} is damaged: its tensors do not match its hash")
+            raise CheckpointError(f"checkpoint {path} is damaged: its tensors are not those saved")
         return meta, {name: torch.tensor(value) for name, value in arrays.items()}
 
     def load_newest(self) -> tuple[Meta, dict[str, torch.Tensor], list[str]] | None:

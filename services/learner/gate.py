@@ -11,6 +11,8 @@ from shared.messages.training import ACTION_DIM, Agent, Rollout
 
 _LOG_PROB_TOLERANCE = 1e-2
 _STD_RANGE = (1e-4, 100.0)
+_LARGEST = 1e6
+"""Of any number to learn from: squares of larger ones would soon be infinite."""
 
 
 class Decision(enum.Enum):
@@ -108,6 +110,9 @@ def check_contents(rollout: Rollout, bout_steps: int) -> Ruling:
     low, high = _STD_RANGE
     if rollout.stds.min() < low or rollout.stds.max() > high:
         return _drop(f"standard deviations are outside {low} .. {high}")
+    for field in ("obs", "last_obs", "actions", "means", "rewards"):
+        if np.abs(getattr(rollout, field)).max() > _LARGEST:
+            return _drop(f"{field} has a value beyond +-{_LARGEST:g}")
     noise = (rollout.actions - rollout.means) / rollout.stds
     expected = -0.5 * np.einsum("tni,tni->tn", noise, noise) - (
         float(np.sum(np.log(rollout.stds))) + 0.5 * ACTION_DIM * math.log(2.0 * math.pi)

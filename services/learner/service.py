@@ -156,7 +156,9 @@ class Learner:
             return meta
         for fault in faults:
             self._last_error = fault
-            self._note("checkpoint_corrupt", f"{fault}; continued from version {meta.policy_version}")
+            self._note(
+                "checkpoint_corrupt", f"{fault}; continued from version {meta.policy_version}"
+            )
         self._optimiser.restore(tensors)
         self._applied = Applied.from_json(meta.applied)
         self._total_samples = meta.total_samples
@@ -489,5 +491,3 @@ def _bytes(snapshot: Snapshot) -> Bytes:
 def _seed_of(seed: int, agent: Agent) -> int:
     """Return the agent's own seed in a run."""
     return seed * 2 + (agent == "protagonist")
-
-

@@ -27,13 +27,13 @@ def rollout(
     sequence: int = 0,
     *,
     policy: PolicyWeights | None = None,
-    seed: int | None = None,
+    draw: int | None = None,
     steps: int = STEPS,
     worlds: int = WORLDS,
     **changes: Any,
 ) -> Rollout:
     """A consistent rollout; observations and rewards are noise, actions are the policy's own."""
-    generator = np.random.default_rng(sequence if seed is None else seed)
+    generator = np.random.default_rng(sequence if draw is None else draw)
     acting = GaussianPolicy(policy or weights((16, 16)))
     obs = generator.normal(0.3, 1.5, (steps, worlds, OBS_DIM)).astype(np.float32)
     means = np.stack([acting.mean(row) for row in obs])
