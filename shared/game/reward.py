@@ -2,7 +2,7 @@
 
 The paper gives no formula for its continuous reward; each term here is bounded in [0, 1] and
 turns one question of the game into a slope: is my bat near the target, is my bat near the
-attacking bat, did I keep out of the target.
+attacking bat, do I wait in the target for an attack.
 """
 
 import msgspec
@@ -45,9 +45,10 @@ def antagonist_shaping(judgement: Judgement, cfg: RewardConfig) -> Floats:
 
 
 def protagonist_shaping(judgement: Judgement, cfg: RewardConfig) -> Floats:
-    """Return float64[N] in [0, 1]: bat on the attacking bat, and not in the target itself."""
+    """Return float64[N] in [0, 1]: bat on the attacking bat, and not waiting in the target."""
     guard = closeness(judgement.bat_distance, cfg.reach)
-    return cfg.guard_weight * guard + (1.0 - cfg.guard_weight) * ~judgement.protagonist_in_target
+    waits = judgement.protagonist_in_target & ~judgement.antagonist_in_target
+    return cfg.guard_weight * guard + (1.0 - cfg.guard_weight) * ~waits
 
 
 def reward(
