@@ -6,6 +6,7 @@ both sides see the same contacts, joint limits and sizes; what differs is what a
 observations, two policies, sampling, commands, judging, rewards, and the rollout's bytes.
 """
 
+import itertools
 import os
 from typing import Any
 
@@ -41,7 +42,7 @@ def a_policy(generator: np.random.Generator) -> GaussianPolicy:
             (generator.standard_normal((after, before)) / np.sqrt(before)).astype(np.float32),
             np.zeros(after, np.float32),
         )
-        for before, after in zip(sizes, sizes[1:], strict=False)
+        for before, after in itertools.pairwise(sizes)
     )
     layers[-1][0][:] *= 0.1  # as in a fresh policy: it explores around holding still
     return GaussianPolicy(
@@ -131,9 +132,7 @@ def measure(smoke: bool) -> Measurement:
     rollouts, rounds = (1, 2) if smoke else (4, 25)
     loops = {num_envs: Loop(num_envs, rollouts) for num_envs in (128, 256)}
     runs = [
-        run
-        for pair in interleaved(rounds, [loop.round for loop in loops.values()])
-        for run in pair
+        run for pair in interleaved(rounds, [loop.round for loop in loops.values()]) for run in pair
     ]
     by_size = {n: [run for run in runs if run["num_envs"] == n] for n in loops}
     at = by_size[256]

@@ -97,9 +97,7 @@ def main(argv: Sequence[str]) -> int:
     parser.add_argument("name", nargs="?", metavar="NAME", help="which; without it: the list")
     parser.add_argument("--smoke", action="store_true", help="a few seconds; figures mean nothing")
     parser.add_argument("--json", action="store_true", help="one JSON object")
-    parser.add_argument(
-        "--write", action="store_true", help=f"add a row to benchmarks/{RESULTS}"
-    )
+    parser.add_argument("--write", action="store_true", help=f"add a row to benchmarks/{RESULTS}")
     found = parser.parse_args(argv)
     folder = benchmarks_folder()
     if found.name is None:

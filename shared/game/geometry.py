@@ -46,10 +46,12 @@ def blade_direction(quaternions: Floats) -> Floats:
         float64[3, ...].
     """
     w, x, y, z = quaternions
-    direction = np.empty((3, *quaternions.shape[1:]))
-    direction[0] = 1.0 - 2.0 * (y * y + z * z)
-    direction[1] = 2.0 * (x * y + w * z)
-    direction[2] = 2.0 * (x * z - w * y)
+    direction: Floats = x * quaternions[1:]
+    direction[0] += w * w
+    direction[1] += w * z
+    direction[2] -= w * y
+    direction *= 2.0
+    direction[0] -= 1.0
     return direction
 
 
@@ -65,9 +67,8 @@ def distance_to_target(grips: Floats, directions: Floats, bat: BatShape, target:
     Returns:
         float64[...].
     """
-    centre = np.asarray(target.centre).reshape(3, *(1 for _ in grips.shape[1:]))
-    to_centre = centre - grips
-    along = np.clip(dot(to_centre, directions), bat.back, bat.front)
+    to_centre = np.array(target.centre).reshape(3, *[1] * (grips.ndim - 1)) - grips
+    along = _on_bat(dot(to_centre, directions), bat)
     return length(to_centre - along * directions) - (bat.radius + target.radius)
 
 
@@ -95,10 +96,15 @@ def distance_between_bats(
     b_offset = dot(directions_b, offset)
     # Parallel blades leave the first guess free; any finite one is corrected by the two answers.
     sine_squared = np.maximum(1.0 - cosine * cosine, 1e-12)
-    on_a = np.clip((cosine * b_offset - a_offset) / sine_squared, bat.back, bat.front)
-    on_b = np.clip(cosine * on_a + b_offset, bat.back, bat.front)
-    on_a = np.clip(cosine * on_b - a_offset, bat.back, bat.front)
+    on_a = _on_bat((cosine * b_offset - a_offset) / sine_squared, bat)
+    on_b = _on_bat(cosine * on_a + b_offset, bat)
+    on_a = _on_bat(cosine * on_b - a_offset, bat)
     return length(offset + on_a * directions_a - on_b * directions_b) - 2.0 * bat.radius
+
+
+def _on_bat(along: Floats, bat: BatShape) -> Floats:
+    """Return positions along the blade, those beyond its ends moved to them."""
+    return np.minimum(np.maximum(along, bat.back), bat.front)
 
 
 def dot(a: Floats, b: Floats) -> Floats:

@@ -80,5 +80,4 @@ def score_step(
         float64[N].
     """
     attack: Floats = np.where(contact, rules.penalty, rules.point) * antagonist_in_target
-    award: Floats = np.where(is_camping_paid(camping, rules), rules.camping_award, 0.0)
-    return attack + award
+    return attack + rules.camping_award * is_camping_paid(camping, rules)

@@ -19,6 +19,9 @@ BAT_DIM = 13
 """Position (3, m), orientation (4, w x y z), linear (3, m/s) and angular velocity (3, rad/s)."""
 _QUATERNION = 3
 """Where the orientation stands in a bat's state."""
+_TIME = 2 * BAT_DIM
+_ONE = _TIME + 1
+"""Where the time, and a one that carries the shifts, stand behind the bats' states."""
 
 OWN_REFERENCE = (0.58, 0.55, -0.33, 0.49)
 OTHER_REFERENCE = (0.49, -0.33, -0.55, -0.58)
@@ -47,8 +50,8 @@ def _quaternion_product_matrix(q: Floats) -> Floats:
 class ObservationEncoder:
     """Turns two bat states and the time into what each of several observers sees.
 
-    Every number but the time is linear in the bats' states, up to the sign of the quaternions;
-    so are the four products that decide those signs. One matrix product gives all of them.
+    Every number is linear in the bats' states and the time, up to the sign of the quaternions; so
+    are the products that decide those signs. So all of it is matrix products.
     """
 
     def __init__(self, centre: tuple[float, float, float], yaws: Sequence[float]) -> None:
@@ -59,49 +62,54 @@ class ObservationEncoder:
             yaws: heading of each observing side in that frame (rad), 0 looks along +x; observer
                 0 owns bat 0, observer 1 bat 1.
         """
-        blocks: list[Floats] = []
-        shifts: list[Floats] = []
+        maps: list[Floats] = []
+        products: list[Floats] = []
         for own, yaw in enumerate(yaws):
             turn, shift = _turn_and_shift(np.asarray(centre), yaw)
-            other = 1 - own
-            block = np.zeros((2 * BAT_DIM, 2 * BAT_DIM))
-            block[own * BAT_DIM : (own + 1) * BAT_DIM, :BAT_DIM] = turn
-            block[other * BAT_DIM : (other + 1) * BAT_DIM, BAT_DIM:] = turn
-            blocks.append(block)
-            shifts.append(np.concatenate([shift, shift]))
-        self._observers = len(yaws)
-        columns = np.concatenate(blocks, axis=1)
-        starts = 2 * BAT_DIM * np.arange(self._observers)[:, None] + np.array(
-            [_QUATERNION, BAT_DIM + _QUATERNION]
-        )
-        signs = [
-            columns[:, start : start + 4] @ reference
-            for start, reference in zip(
-                starts.ravel(), [OWN_REFERENCE, OTHER_REFERENCE] * self._observers, strict=True
-            )
-        ]
-        self._map = np.concatenate([columns, np.stack(signs, axis=1)], axis=1).astype(np.float32)
-        self._shift = np.concatenate(shifts).astype(np.float32)
+            seen = np.zeros((2 * BAT_DIM + 2, 2 * BAT_DIM + 1))
+            for place, bat in enumerate((own, 1 - own)):
+                rows = slice(bat * BAT_DIM, (bat + 1) * BAT_DIM)
+                columns = slice(place * BAT_DIM, (place + 1) * BAT_DIM)
+                seen[rows, columns] = turn
+                seen[_ONE, columns] = shift
+            seen[_TIME, -1] = 1.0
+            maps.append(seen)
+            for place, reference in enumerate((OWN_REFERENCE, OTHER_REFERENCE)):
+                start = place * BAT_DIM + _QUATERNION
+                products.append(seen[:, start : start + 4] @ reference)
+        products.append(np.eye(2 * BAT_DIM + 2)[_ONE])  # the sign of what has none to choose
+        self._maps = [seen.astype(np.float32) for seen in maps]
+        self._products = np.stack(products, axis=1).astype(np.float32)
+        self._spreads = [_spread(observer, len(yaws)) for observer in range(len(yaws))]
 
     def encode(self, bats: Floats, seconds: Floats, outs: Sequence[Observations]) -> None:
         """Write what each observer sees.
 
         Args:
-            bats: float64[N, 26], the states of bat 0 and bat 1 in the tracking frame: position,
-                orientation (w x y z), linear and angular velocity.
+            bats: float64[N, 26] or [N, 2, 13], the states of bat 0 and bat 1 in the tracking
+                frame: position, orientation (w x y z), linear and angular velocity.
             seconds: float64[N], game time.
             outs: float32[N, 27] for each observer.
         """
-        width = 2 * BAT_DIM
-        split = self._observers * width
-        mapped = bats.astype(np.float32) @ self._map
-        numbers, products = mapped[:, :split], mapped[:, split:]
-        numbers += self._shift
-        quaternions = numbers.reshape(len(bats), -1, BAT_DIM)[:, :, _QUATERNION : _QUATERNION + 4]
-        quaternions *= np.copysign(np.float32(1.0), products)[:, :, None]
-        for observer, out in enumerate(outs):
-            out[:, :width] = numbers[:, observer * width : (observer + 1) * width]
-            out[:, width] = seconds
+        known = np.empty((len(bats), 2 * BAT_DIM + 2), np.float32)
+        known[:, :_TIME].reshape(-1, 2, BAT_DIM)[:] = bats.reshape(-1, 2, BAT_DIM)
+        known[:, _TIME] = seconds
+        known[:, _ONE] = 1.0
+        signs = np.copysign(np.float32(1.0), known @ self._products)
+        for out, seen, spread in zip(outs, self._maps, self._spreads, strict=True):
+            np.matmul(known, seen, out=out)
+            out *= signs @ spread
+
+
+def _spread(observer: int, observers: int) -> Observations:
+    """Return float32[2 * observers + 1, 27]: signs, a one at their end, to a factor a number."""
+    spread = np.zeros((2 * observers + 1, 2 * BAT_DIM + 1), np.float32)
+    spread[-1] = 1.0
+    for place in range(2):
+        start = place * BAT_DIM + _QUATERNION
+        spread[:, start : start + 4] = 0.0
+        spread[2 * observer + place, start : start + 4] = 1.0
+    return spread
 
 
 def _turn_and_shift(centre: Floats, yaw: float) -> tuple[Floats, Floats]:

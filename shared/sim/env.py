@@ -64,8 +64,7 @@ class FencingEnv:
             protagonist: float32[N, 27], written.
         """
         seconds: Floats = self.scores.step * np.float64(self.model.cfg.control_timestep)
-        bats = self._bats.reshape(self.num_envs, 2 * BAT_DIM)
-        self._encoder.encode(bats, seconds, (antagonist, protagonist))
+        self._encoder.encode(self._bats, seconds, (antagonist, protagonist))
 
     def step(self, antagonist: Float32s, protagonist: Float32s) -> Judgement:
         """Carry out one control step in every bout and judge it.
