@@ -10,13 +10,13 @@ class LeagueConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """Seed of the run; every lease's seed follows from it."""
     iterations: int = 2
     """Iterations of phase one; in each the antagonist learns first, then the protagonist."""
-    antagonist_updates: int = 100
+    antagonist_updates: int = 80
     """Most PPO updates of the antagonist in one stage."""
     protagonist_updates: int = 120
     """Most PPO updates of the protagonist in one stage."""
     score_weights: tuple[float, ...] = (1.0,)
     """Factor of the game score in the reward, by iteration; the last one holds for the rest."""
-    shaping_weights: tuple[float, ...] = (0.1,)
+    shaping_weights: tuple[float, ...] = (0.3,)
     """Factor of the continuous reward, by iteration; the last one holds for the rest."""
     convergence_min_updates: int = 60
     """A stage is not called converged before this many updates; 0 never ends a stage early."""

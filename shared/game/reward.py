@@ -2,7 +2,7 @@
 
 The paper gives no formula for its continuous reward; each term here is bounded in [0, 1] and
 turns one question of the game into a slope: is my bat near the target, is my bat near the
-attacking bat, do I wait in the target for an attack.
+attacking bat, did I keep out of the target.
 """
 
 import msgspec
@@ -21,7 +21,7 @@ class RewardConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """Reward for one point of the game; keeps the +-10 of penalty and camping near one."""
     reach: float = 0.5
     """Distance (m) at which the closeness terms have fallen to 1/e."""
-    guard_weight: float = 0.5
+    guard_weight: float = 0.3
     """Share of the protagonist's shaping that is for staying close to an attacking bat."""
 
     def __post_init__(self) -> None:
@@ -45,10 +45,9 @@ def antagonist_shaping(judgement: Judgement, cfg: RewardConfig) -> Floats:
 
 
 def protagonist_shaping(judgement: Judgement, cfg: RewardConfig) -> Floats:
-    """Return float64[N] in [0, 1]: bat on the attacking bat, and not waiting in the target."""
+    """Return float64[N] in [0, 1]: bat on the attacking bat, and not in the target itself."""
     guard = closeness(judgement.bat_distance, cfg.reach)
-    waits = judgement.protagonist_in_target & ~judgement.antagonist_in_target
-    return cfg.guard_weight * guard + (1.0 - cfg.guard_weight) * ~waits
+    return cfg.guard_weight * guard + (1.0 - cfg.guard_weight) * ~judgement.protagonist_in_target
 
 
 def reward(
