@@ -1,0 +1,85 @@
+"""Training samples a second: the processes of a real run against rsl_rl's runner in one process.
+
+Both train the antagonist against a frozen fresh protagonist, on two cores, with the same PPO. The
+runner gets the number of worlds and of torch threads that suits it best; the run is what
+`riposte train` starts, with its recorder, but with the live page off. Rounds are interleaved.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from typing import Any
+
+from benchmarks.harness import ROOT, interleaved, median
+from benchmarks.training_run import training_run
+from services.jobs.bench import Check, Measurement
+
+QUESTION = "training samples/s of a real run against rsl_rl's runner in one process, on two cores"
+GOAL = 1.5
+CHOICES = ((128, 1), (256, 1), (512, 1), (256, 2))
+"""Worlds and torch threads that the runner may choose from."""
+
+
+def baseline(num_envs: int, threads: int, seconds: float) -> dict[str, Any]:
+    """Return how fast rsl_rl's runner trains, in a process of its own."""
+    command = [
+        sys.executable, "-m", "benchmarks.baseline_rsl_rl", "--seconds", str(seconds),
+        "--num-envs", str(num_envs), "--threads", str(threads),
+    ]  # fmt: skip
+    done = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=600
+    )
+    if done.returncode:
+        raise SystemExit(f"the baseline failed: {done.stderr.strip().splitlines()[-1]}")
+    return json.loads(done.stdout)
+
+
+def ours(seconds: float) -> dict[str, Any]:
+    """Return how fast a real run trains."""
+    with training_run() as run:
+        return run.window(seconds)
+
+
+def measure(smoke: bool) -> Measurement:
+    """Return our training speed beside the best single process."""
+    cores = sorted(os.sched_getaffinity(0))
+    os.sched_setaffinity(0, cores[:2])
+    seconds, rounds = (1.0, 1) if smoke else (25.0, 4)
+    choices = CHOICES[:1] if smoke else CHOICES
+    tried = [baseline(*choice, min(seconds, 10.0)) for choice in choices]
+    best = max(tried, key=lambda figures: figures["samples_per_s"])
+
+    def best_baseline() -> dict[str, Any]:
+        return baseline(int(best["num_envs"]), int(best["threads"]), seconds)
+
+    pairs = interleaved(rounds, [best_baseline, lambda: ours(seconds)])
+    runs = tuple(
+        {
+            "ratio": our["samples_per_s"] / their["samples_per_s"],
+            "cpu_ratio": our["samples_per_cpu_s"] / their["samples_per_cpu_s"],
+            "ours": our["samples_per_s"],
+            "baseline": their["samples_per_s"],
+            "ours_per_cpu_s": our["samples_per_cpu_s"],
+            "baseline_per_cpu_s": their["samples_per_cpu_s"],
+            "ours_details": our,
+            "baseline_details": their,
+        }
+        for their, our in pairs
+    )
+    os.sched_setaffinity(0, cores)
+    return Measurement(
+        value=median(runs, "ours"),
+        unit="samples/s",
+        limit=median(runs, "baseline"),
+        ratio=Check(name="our samples/s / the baseline's", value=median(runs, "ratio"), goal=GOAL),
+        runs=runs,
+        checks=(
+            Check(name="samples per CPU second, ours", value=median(runs, "ours_per_cpu_s")),
+            Check(name="samples per CPU second, baseline", value=median(runs, "baseline_per_cpu_s")),
+            Check(name="cores kept busy by ours", value=median(
+                [{"x": run["ours_details"]["cpu_s"] / run["ours_details"]["wall_s"]} for run in runs],
+                "x")),
+        ),
+        details={"baselines_tried": tried},
+    )  # fmt: skip

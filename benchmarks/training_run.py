@@ -1,0 +1,148 @@
+"""A real training run, as `riposte train` starts it, for benchmarks to look at from outside."""
+
+import contextlib
+import dataclasses
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from services.jobs.settings import Settings
+from services.jobs.train import free_port, processes
+from services.league.history import RunState, VersionRecord
+from services.league.ledger import open_read_only
+from services.supervisor import ProcessSpec, Supervisor
+from shared.clock import SystemClock
+from shared.errors import LedgerError, RiposteError
+
+POLL_SECONDS = 0.05
+START_SECONDS = 180.0
+"""Longest wait for the first version on a busy machine."""
+ENDLESS = ("league.antagonist_updates=1000000", "league.convergence_min_updates=0")
+"""One stage: the antagonist against the frozen first protagonist."""
+WARM_VERSION = 4
+"""The first version is the normaliser's warm-up, the next few fill the pipeline."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Moment:
+    """Where a run stood."""
+
+    version: VersionRecord
+    at: float
+    """When this was noticed, by ``time.monotonic``."""
+    cpu_seconds: dict[str, float]
+    """Used so far, by process."""
+
+
+class TrainingRun:
+    """The processes of one run; tick them by asking for something."""
+
+    def __init__(self, specs: list[ProcessSpec], folder: Path) -> None:
+        self.folder = folder
+        self.began_at = time.monotonic()
+        self._supervisor = Supervisor(specs, folder / "logs", SystemClock())
+        self._supervisor.start()
+
+    def wait_for_version(self, number: int, deadline: float) -> Moment:
+        """Return the moment at which the antagonist's version was in the ledger.
+
+        Raises:
+            RiposteError: a process died, or it took longer than the deadline (s).
+        """
+        end = time.monotonic() + deadline
+        while time.monotonic() < end:
+            for event in self._supervisor.poll():
+                if event.kind != "finished":
+                    raise RiposteError(f"{event.describe}\n{event.tail}")
+            newest = self.newest_version()
+            if newest is not None and newest.version >= number:
+                return Moment(newest, time.monotonic(), self.cpu_seconds())
+            time.sleep(POLL_SECONDS)
+        raise RiposteError(f"no version {number} within {deadline:g} s: see {self.folder / 'logs'}")
+
+    def newest_version(self) -> VersionRecord | None:
+        """Return the antagonist's newest version in the ledger; None before there is one."""
+        if not (self.folder / "league.sqlite").exists():
+            return None
+        try:
+            with open_read_only(self.folder / "league.sqlite") as ledger:
+                return RunState.fold(ledger.replay()).latest("antagonist")
+        except LedgerError:  # being made
+            return None
+
+    def cpu_seconds(self) -> dict[str, float]:
+        """Return the CPU seconds each process has used."""
+        return {
+            name: sum(psutil.Process(pid).cpu_times()[:2])
+            for name, pid in self._supervisor.pids.items()
+        }
+
+    def resident_mib(self) -> dict[str, float]:
+        """Return the memory each process holds."""
+        return {
+            name: psutil.Process(pid).memory_info().rss / 2**20
+            for name, pid in self._supervisor.pids.items()
+        }
+
+    def window(self, seconds: float) -> dict[str, Any]:
+        """Return samples and CPU seconds of a stretch between two versions, warm."""
+        begin = self.wait_for_version(WARM_VERSION, START_SECONDS)
+        end = self.wait_for_version(begin.version.version + 1, START_SECONDS)
+        while end.at - begin.at < seconds:
+            end = self.wait_for_version(end.version.version + 1, START_SECONDS)
+        assert begin.version.metrics is not None
+        assert end.version.metrics is not None
+        samples = end.version.metrics.total_samples - begin.version.metrics.total_samples
+        wall = (end.version.at_ns - begin.version.at_ns) / 1e9
+        cpu = {name: end.cpu_seconds[name] - begin.cpu_seconds[name] for name in end.cpu_seconds}
+        return {
+            "samples": samples,
+            "samples_per_s": samples / wall,
+            "samples_per_cpu_s": samples / sum(cpu.values()),
+            "wall_s": wall,
+            "cpu_s": sum(cpu.values()),
+            "cpu_s_by_process": cpu,
+            "began_at": begin.at,
+            "ended_at": end.at,
+            "update_seconds": end.version.metrics.update_seconds,
+            "wait_seconds": end.version.metrics.wait_seconds,
+        }
+
+    def stop(self) -> None:
+        """End all processes."""
+        self._supervisor.stop()
+
+
+@contextlib.contextmanager
+def training_run(
+    overrides: Sequence[str] = ENDLESS, wrap: Sequence[str] = ()
+) -> Iterator[TrainingRun]:
+    """Run a training, in a folder of its own, until the block ends.
+
+    Args:
+        overrides: of the default settings.
+        wrap: module arguments to put before the service's module: ``python -m WRAP ...``.
+    """
+    folder = Path(tempfile.mkdtemp(prefix="riposte-bench-"))
+    settings = Settings.load(None, ["recorder.live=false", *overrides])
+    (folder / "config.toml").write_text(settings.to_toml(), encoding="utf-8")
+    specs = processes(settings, folder, folder.name, f"tcp/127.0.0.1:{free_port()}")
+    if wrap:
+        specs = [dataclasses.replace(spec, argv=_wrapped(spec.argv, wrap)) for spec in specs]
+    run = TrainingRun(specs, folder)
+    try:
+        yield run
+    finally:
+        run.stop()
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _wrapped(argv: tuple[str, ...], wrap: Sequence[str]) -> tuple[str, ...]:
+    """Return ``python -P -m WRAP services.role ...`` for ``python -P -m services.role ...``."""
+    at = argv.index("-m") + 1
+    return (*argv[:at], *wrap, *argv[at:])
