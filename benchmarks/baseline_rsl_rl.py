@@ -17,22 +17,22 @@ from shared.runtime.process import THREAD_LIMITS
 
 os.environ.update(THREAD_LIMITS)
 
-import numpy as np  # noqa: E402
-import torch  # noqa: E402
-from rsl_rl.env import VecEnv  # noqa: E402
-from rsl_rl.runners import OnPolicyRunner  # noqa: E402
-from tensordict import TensorDict  # noqa: E402
+import numpy as np
+import torch
+from rsl_rl.env import VecEnv
+from rsl_rl.runners import OnPolicyRunner
+from tensordict import TensorDict
 
-from services.actor.collector import staggered_starts  # noqa: E402
-from services.jobs.settings import Settings  # noqa: E402
-from services.learner.config import LearnerConfig  # noqa: E402
-from services.learner.ppo import PolicyOptimiser  # noqa: E402
-from shared.game.reward import reward  # noqa: E402
-from shared.messages.training import ACTION_DIM, OBS_DIM  # noqa: E402
-from shared.policy.mlp import GaussianPolicy  # noqa: E402
-from shared.policy.players import SnapshotPlayer  # noqa: E402
-from shared.sim.env import FencingEnv  # noqa: E402
-from shared.sim.model import FencingModel  # noqa: E402
+from services.actor.collector import staggered_starts
+from services.jobs.settings import Settings
+from services.learner.config import LearnerConfig
+from services.learner.ppo import PolicyOptimiser
+from shared.game.reward import reward
+from shared.messages.training import ACTION_DIM, OBS_DIM
+from shared.policy.mlp import GaussianPolicy
+from shared.policy.players import SnapshotPlayer
+from shared.sim.env import FencingEnv
+from shared.sim.model import FencingModel
 
 WARM_UP = 2
 """Iterations before the clock starts."""
@@ -62,9 +62,11 @@ class FencingVecEnv(VecEnv):
         self._obs = self._observe()
 
     def get_observations(self) -> TensorDict:
+        """Return what the antagonists see now."""
         return self._obs
 
     def step(self, actions: torch.Tensor) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict]:
+        """Play one control step of every bout; finished ones start anew."""
         other = self._opponent.act(self._other, self._generator)
         judgement = self._env.step(actions.numpy(), other)
         rewards = reward(0, judgement, *self._weights, self._reward).astype(np.float32)

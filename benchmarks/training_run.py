@@ -37,6 +37,8 @@ class Moment:
     """When this was noticed, by ``time.monotonic``."""
     cpu_seconds: dict[str, float]
     """Used so far, by process."""
+    delay_seconds: float
+    """For which threads of theirs were ready to run and had no core."""
 
 
 class TrainingRun:
@@ -61,7 +63,7 @@ class TrainingRun:
                     raise RiposteError(f"{event.describe}\n{event.tail}")
             newest = self.newest_version()
             if newest is not None and newest.version >= number:
-                return Moment(newest, time.monotonic(), self.cpu_seconds())
+                return Moment(newest, time.monotonic(), self.cpu_seconds(), self.delay_seconds())
             time.sleep(POLL_SECONDS)
         raise RiposteError(f"no version {number} within {deadline:g} s: see {self.folder / 'logs'}")
 
@@ -81,6 +83,15 @@ class TrainingRun:
             name: sum(psutil.Process(pid).cpu_times()[:2])
             for name, pid in self._supervisor.pids.items()
         }
+
+    def delay_seconds(self) -> float:
+        """Return how long their threads were ready to run and had no core."""
+        schedstats = (
+            path
+            for pid in self._supervisor.pids.values()
+            for path in Path(f"/proc/{pid}/task").glob("*/schedstat")
+        )
+        return sum(int(path.read_text().split()[1]) for path in schedstats) / 1e9
 
     def resident_mib(self) -> dict[str, float]:
         """Return the memory each process holds."""
@@ -107,6 +118,7 @@ class TrainingRun:
             "wall_s": wall,
             "cpu_s": sum(cpu.values()),
             "cpu_s_by_process": cpu,
+            "delay_s": end.delay_seconds - begin.delay_seconds,
             "began_at": begin.at,
             "ended_at": end.at,
             "update_seconds": end.version.metrics.update_seconds,
