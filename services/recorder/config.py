@@ -17,7 +17,7 @@ class RecorderConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     live_period: float = 0.25
     """Seconds from one batch of the live bout to the next."""
     file_period: float = 5.0
-    """Seconds from one batch of the bout in the file to the next."""
+    """Seconds from one write to the file to the next; a kill loses at most this much."""
     status_period: float = 5.0
     """Seconds from one point of a service's health curve to the next."""
     bout_steps: int = 2000

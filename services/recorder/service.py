@@ -29,8 +29,6 @@ from shared.telemetry.rrd import next_recording, recordings, trim
 from shared.telemetry.scene import Scene
 from shared.telemetry.viewer import WebViewer, free_port
 
-FLUSH_PERIOD = 1.0
-"""Seconds from one flush of the file to the next; a kill loses at most this and a bout batch."""
 DISK_PERIOD = 5.0
 """Seconds from one look at the free space to the next."""
 TAKE_MOST = 64
@@ -73,6 +71,7 @@ class Recorder:
             self._close_viewer()
             raise RiposteError(f"cannot record into {directory}: {error.strerror}") from error
         draw_scene(self._recording, scene)
+        self._recording.flush()
         self._narrator = Narrator(self._recording, clock, cfg.status_period)
         self._playback = Playback(scene.control_timestep, cfg.frames_per_second, cfg.bout_steps)
         self._live = BoutDrawer(self._recording, scene, "live")
@@ -83,7 +82,8 @@ class Recorder:
         self._schedule = bus.subscribe(SCHEDULE)
         self._status = bus.subscribe(STATUS)
         now = clock.now()
-        self._bout_due = self._file_due = self._flush_due = self._disk_due = now
+        self._bout_due = self._disk_due = now
+        self._file_due = now + cfg.file_period
 
     @property
     def url(self) -> str:
@@ -100,15 +100,13 @@ class Recorder:
             self._bout_due = now + self._cfg.live_period
             self._show_bout(now)
         self._narrator.tick(now)
-        if now >= self._file_due:
-            self._file_due = now + self._cfg.file_period
-            self._write_bout()
         if now >= self._disk_due:
             self._disk_due = now + DISK_PERIOD
             self._look_at_disk()
-        if now >= self._flush_due:
-            self._flush_due = now + FLUSH_PERIOD
-            self._recording.flush(0.0)
+        if now >= self._file_due:
+            self._file_due = now + self._cfg.file_period
+            self._write_bout()
+            self._recording.flush()
             self._notice_file_error()
         return did
 
@@ -185,14 +183,8 @@ class Recorder:
     def _write_bout(self) -> None:
         if self._file_rows:
             rows, self._file_rows = BoutRows.join(self._file_rows), []
-            if self._file_size() < self._cfg.file_bouts_mib * MIB:
+            if self._recording.file_size < self._cfg.file_bouts_mib * MIB:
                 self._filed.draw(rows)
-
-    def _file_size(self) -> int:
-        file = self._recording.file
-        with contextlib.suppress(OSError):
-            return file.stat().st_size if file is not None else 0
-        return 0
 
     def _look_at_disk(self) -> None:
         if not self._recording.has_file:

@@ -148,8 +148,6 @@ class BoutDrawer:
         poses = np.concatenate([rows.positions, rows.quaternions], axis=2)
         before = poses[:1] if self._poses is None else self._poses[None]
         moved: Array = np.any(np.abs(poses - before) > STILL, axis=(0, 2))
-        if self._poses is None:
-            moved = np.ones_like(moved)
         self._poses = poses[-1]
         names = self._scene.body_names
         bodies = [b for b, name in enumerate(names) if name != WORLD]

@@ -9,7 +9,6 @@ chunks; the live bout, of which the server forgets the oldest part; the live cur
 keeps, so that who opens the page late sees the whole run's curves. Nothing here waits.
 """
 
-import contextlib
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,6 +16,8 @@ from typing import Any, Literal
 
 import numpy as np
 import rerun as rr
+
+from shared.telemetry.rrd import RecordingFile, compact
 
 APPLICATION = "riposte"
 Level = Literal["INFO", "WARN", "ERROR"]
@@ -42,6 +43,10 @@ LEAGUE_STATE = "league/state"
 VERSIONS = "league/version"
 SERVICES = "services"
 LOG = "log"
+FLUSH_SECONDS = 0.05
+"""How long a flush waits for a slow disk; what is not written by then is written later."""
+FILE_HOLD = 10.0
+"""Seconds that rows for the file are gathered at most, unless it is flushed: few, large chunks."""
 LEARNING_CURVES = ("approx_kl", "clip_fraction", "explained_variance", "policy_lag_mean")
 """Drawn for each agent."""
 
@@ -122,16 +127,19 @@ class Recording:
         Raises:
             OSError: the file cannot be made.
         """
-        self.file = file
         self.file_error = ""
         """Why the file ended before the run did; empty while it is written."""
+        self._file: RecordingFile | None = None
         self._file_stream: rr.RecordingStream | None = None
+        self._file_bytes: rr.BinaryStream | None = None
         self._curves: rr.RecordingStream | None = None
         self._bout: rr.RecordingStream | None = None
         if file is not None:
-            file.open("xb").close()  # Rerun would only log that it cannot
-            self._file_stream = _stream(recording_id)
-            self._file_stream.set_sinks(rr.FileSink(file), default_blueprint=blueprint)
+            self._file = RecordingFile(file)
+            self._file_stream = _stream(recording_id, FILE_HOLD)
+            self._file_bytes = self._file_stream.binary_stream()
+            if blueprint is not None:
+                self._file_stream.send_blueprint(blueprint)
         if live is not None:
             self._curves, self._bout = _stream(recording_id), _stream(recording_id)
             self._curves.set_sinks(
@@ -187,28 +195,43 @@ class Recording:
         if stream is not None:
             stream.send_columns(path, indexes=times, columns=columns)
 
-    def flush(self, timeout: float = 1.0) -> None:
-        """Hand everything to the file; find out here whether it still takes it."""
-        if self._file_stream is None:
+    def flush(self, timeout: float = FLUSH_SECONDS) -> None:
+        """Write to the file what was logged; it is gathered in memory until then."""
+        if self._file is None or self._file_bytes is None:
             return
         try:
-            self._file_stream.flush(timeout_sec=timeout)
-        except (RuntimeError, ValueError, TimeoutError) as error:
-            self._give_up(str(error))
+            stream = self._file_bytes.read(flush_timeout_sec=timeout)
+        except RuntimeError:
+            return  # not encoded in time: the next flush has it
+        if stream:
+            try:
+                self._file.write(stream)
+            except OSError as error:
+                self.give_up_file(error.strerror or str(error))
 
     def give_up_file(self, reason: str) -> None:
-        """End the file now, whole, because it must not grow further."""
-        if self._file_stream is not None:
-            self._give_up(reason)
+        """End the file here, whole, because it cannot or must not grow further."""
+        if self._file is not None:
+            self.file_error = reason
+            self._end_file()
 
-    def close(self, timeout: float = 5.0) -> None:
-        """Write the file's footer and let the live viewers go."""
+    def close(self, timeout: float = 2.0) -> None:
+        """Write the rest to the file, compact it, and let the live viewers go."""
         self.flush(timeout)
-        for stream in (self._file_stream, self._curves, self._bout):
+        if self._file is not None:
+            path, size = self._file.path, self._file.size
+            self._end_file()
+            if size:
+                compact(path)
+        for stream in (self._curves, self._bout):
             if stream is not None:
-                with contextlib.suppress(RuntimeError):
-                    stream.disconnect()
-        self._file_stream = self._curves = self._bout = None
+                stream.disconnect()
+        self._curves = self._bout = None
+
+    @property
+    def file_size(self) -> int:
+        """Return how many bytes the file has."""
+        return self._file.size if self._file is not None else 0
 
     @property
     def has_live(self) -> bool:
@@ -220,12 +243,12 @@ class Recording:
         """Return whether the file is still written."""
         return self._file_stream is not None
 
-    def _give_up(self, reason: str) -> None:
-        stream, self._file_stream = self._file_stream, None
-        self.file_error = reason
-        if stream is not None:
-            with contextlib.suppress(RuntimeError):
-                stream.disconnect()
+    def _end_file(self) -> None:
+        if self._file is not None:
+            self._file.close()
+        if self._file_stream is not None:
+            self._file_stream.disconnect()
+        self._file = self._file_stream = self._file_bytes = None
 
     def _log(self, path: str, archetype: Any, wall_ns: int, samples: int | None = None) -> None:
         for stream in self._both(self._curves):
@@ -240,5 +263,7 @@ class Recording:
         return [stream for stream in (self._file_stream, live) if stream is not None]
 
 
-def _stream(recording_id: str) -> rr.RecordingStream:
-    return rr.RecordingStream(APPLICATION, recording_id=recording_id)
+def _stream(recording_id: str, hold_seconds: float = 0.2) -> rr.RecordingStream:
+    """Return a stream that gathers rows of one entity for so long before it sends them on."""
+    batching = rr.ChunkBatcherConfig(flush_tick=hold_seconds)
+    return rr.RecordingStream(APPLICATION, recording_id=recording_id, batcher_config=batching)

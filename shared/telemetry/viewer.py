@@ -58,7 +58,7 @@ class WebViewer:
         files = not all(source.startswith("rerun+") for source in sources)
         grpc_port = free_port()
         command = [
-            *launcher, str(_program()), *sources, "--serve-web", "--bind", HOST,
+            *launcher, str(viewer_program()), *sources, "--serve-web", "--bind", HOST,
             "--web-viewer-port", str(self.web_port), "--port", str(grpc_port),
         ]  # fmt: skip
         shown = [f"rerun+http://{HOST}:{grpc_port}/proxy"] if files else sources
@@ -110,7 +110,12 @@ class WebViewer:
                 self._process.wait(timeout)
 
 
-def _program() -> Path:
+def viewer_program() -> Path:
+    """Return the program that comes with Rerun.
+
+    Raises:
+        RiposteError: it is not there.
+    """
     spec = util.find_spec("rerun_cli")
     for folder in (spec.submodule_search_locations or []) if spec is not None else []:
         for name in ("rerun", "rerun.exe"):
