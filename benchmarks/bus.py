@@ -1,271 +1,91 @@
-"""What the bus costs: codec, round trip, and rollouts from one process to another and back.
+"""What the bus and the codec cost of a training run's CPU seconds, and what they could carry.
 
-``python benchmarks/bus.py [--smoke] [--json]``. One actor asks, one learner answers, a router in a
-third process carries; beside it, in the same run, the same bytes go through a bare TCP connection
-of the loopback and are acknowledged there, which is the limit that the rate is compared with.
+Every service of a real run is started with its bus timed (``counted_service``). Counted as bus:
+all of the router; in the other processes every call into the bus on the service's own thread
+(encoding, decoding, sending, waiting) and every other thread, Zenoh's or not; only in the recorder
+Rerun's threads are left out. So the share errs upward, never downward.
 """
 
-import argparse
-import contextlib
 import json
-import socket
-import statistics
-import subprocess
-import sys
-import tempfile
-import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import psutil
+from benchmarks import throughput
+from benchmarks.harness import median
+from benchmarks.training_run import ENDLESS, training_run
+from services.jobs.bench import Check, Measurement
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-
-from shared.bus.config import BusConfig  # noqa: E402
-from shared.bus.zenoh import ZenohBus, open_zenoh  # noqa: E402
-from shared.clock import SystemClock  # noqa: E402
-from shared.messages.league import Lease, LeaseRequest  # noqa: E402
-from shared.messages.topics import LEASE, ROLLOUT  # noqa: E402
-from shared.messages.training import ACTION_DIM, OBS_DIM, Receipt, Rollout  # noqa: E402
-from shared.messages.wire import decode, encode  # noqa: E402
-from shared.runtime.build import commit  # noqa: E402
-
-WINDOW = 4
-"""Rollouts under way at a time."""
-RUN = "bench"
-REQUEST = LeaseRequest(actor="actor-0", boot="b0", num_envs=128)
+QUESTION = "which share of a training run's CPU seconds goes into bus and codec"
+GOAL = 0.10
+RERUN_THREADS = ("ChunkBatcher", "RecordingStream", "jemalloc", "rerun", "re_", "log_sink")
+"""How the names of the recorder's own threads begin."""
 
 
-def a_rollout(T: int = 40, N: int = 128) -> Rollout:
-    """Return a rollout of the default size."""
-    rng = np.random.default_rng(0)
-
-    def noise(*shape: int) -> Any:
-        return rng.standard_normal(shape).astype(np.float32)
-
-    return Rollout(
-        agent="antagonist", actor="actor-0", boot="b" * 16, sequence=7, lease="l" * 16, stage=2,
-        policy_version=5, snapshot="ab" * 32, opponent="sha256:" + "ab" * 32, model="cd" * 32,
-        seed=1, bouts=np.arange(N), first_step=np.zeros(N, np.int32), obs=noise(T, N, OBS_DIM),
-        last_obs=noise(N, OBS_DIM), actions=noise(T, N, ACTION_DIM), means=noise(T, N, ACTION_DIM),
-        stds=noise(ACTION_DIM), log_probs=noise(T, N), rewards=noise(T, N),
-        truncated=np.zeros(N, bool),
-    )  # fmt: skip
-
-
-def codec(rounds: int) -> dict[str, float]:
-    """Return microseconds of CPU to encode and to decode one rollout (medians)."""
-    message = a_rollout()
-    payload = encode(message)
-    return {
-        "encode_us": median_us(lambda: encode(message), rounds),
-        "decode_us": median_us(lambda: decode(Rollout, payload, ROLLOUT.max_bytes), rounds),
-        "payload_bytes": len(payload),
-    }
-
-
-def median_us(call: Callable[[], object], rounds: int) -> float:
-    """Return the median CPU time of a call."""
-    times: list[float] = []
-    for _ in range(rounds):
-        begin = time.process_time_ns()
-        call()
-        times.append((time.process_time_ns() - begin) / 1e3)
-    return statistics.median(times)
-
-
-def round_trips(bus: ZenohBus, rounds: int) -> dict[str, float]:
-    """Return milliseconds from asking to holding the answer of a small request."""
-    times: list[float] = []
-    for _ in range(rounds):
-        begin = time.perf_counter()
-        pending = bus.ask(LEASE, REQUEST, 5.0)
-        while (answer := pending.take()) is None:
-            bus.wait(5.0)
-        if not isinstance(answer, Lease):
-            raise SystemExit(f"no answer: {answer}")
-        times.append(1e3 * (time.perf_counter() - begin))
-    times.sort()
-    return {"p50_ms": times[len(times) // 2], "p99_ms": times[-1 - len(times) // 100]}
-
-
-def rollouts(bus: ZenohBus, rounds: int, processes: list[psutil.Process]) -> dict[str, float]:
-    """Return the rate and the CPU time, of all processes, of acknowledged rollouts."""
-    message = a_rollout()
-    size = len(encode(message))
-    pendings: list[Any] = []
-    sent = done = 0
-    cpu_before, begin = cpu_seconds(processes), time.perf_counter()
-    while done < rounds:
-        while sent < rounds and len(pendings) < WINDOW:
-            pendings.append(bus.ask(ROLLOUT, message, 10.0, agent="antagonist"))
-            sent += 1
-        bus.wait(1.0)
-        left = [pending for pending in pendings if pending.take() is None]
-        for pending in pendings:
-            answer = pending.take()
-            if answer is not None and not isinstance(answer, Receipt):
-                raise SystemExit(f"no receipt: {answer}")
-        done += len(pendings) - len(left)
-        pendings = left
-    wall, cpu = time.perf_counter() - begin, cpu_seconds(processes) - cpu_before
-    megabytes = rounds * size / 1e6
-    return {
-        "mb_per_s": megabytes / wall,
-        "cpu_ms_per_mb": 1e3 * cpu / megabytes,
-        "cpu_us_per_sample": 1e6 * cpu / (rounds * 40 * 128),
-        "wall_s": wall,
-        "cpu_s": cpu,
-    }
-
-
-def bare_tcp(rounds: int, size: int) -> float:
-    """Return MB/s of the same bytes through one TCP connection, acknowledged by one byte."""
-    with start("--sink", str(size)) as process:
-        assert process.stdout is not None
-        port = int(process.stdout.readline())
-        payload = bytes(size)
-        with socket.create_connection(("127.0.0.1", port), timeout=30) as link:
-            begin = time.perf_counter()
-            for number in range(rounds):
-                link.sendall(payload)
-                if number >= WINDOW:
-                    link.recv(1)
-            for _ in range(min(rounds, WINDOW)):
-                link.recv(1)
-            return rounds * size / 1e6 / (time.perf_counter() - begin)
-
-
-def sink(size: int) -> None:
-    """Acknowledge every ``size`` bytes with one; the other end of ``bare_tcp``."""
-    buffer = memoryview(bytearray(size))
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        print(server.getsockname()[1], flush=True)
-        link, _ = server.accept()
-        with link:
-            while True:
-                at = 0
-                while at < size:
-                    got = link.recv_into(buffer[at:])
-                    if not got:
-                        return
-                    at += got
-                link.sendall(b"k")
-
-
-def answer(endpoint: str) -> None:
-    """Answer everything at once, until killed: the other end of the bus."""
-    bus = open_zenoh(BusConfig(connect=(endpoint,)), "learner", SystemClock(), RUN)
-    leases, inbox = bus.answer(LEASE), bus.answer(ROLLOUT, agent="antagonist")
-    bus.declare_alive("learner")
-    while True:
-        bus.wait(1.0)
-        while (request := leases.take()) is not None:
-            request.reply(Lease(lease="x", kind="none"))
-        while (rollout := inbox.take()) is not None:
-            rollout.reply(Receipt(accepted=True))
-
-
-def cpu_seconds(processes: list[psutil.Process]) -> float:
-    """Return the CPU seconds used so far by all of them."""
-    return sum(sum(process.cpu_times()[:2]) for process in processes)
-
-
-@contextlib.contextmanager
-def start(*args: str, module: str = "") -> Iterator[subprocess.Popen[str]]:
-    """Run this script, or a module, in a process of its own until the block ends."""
-    program = ["-m", module] if module else [str(Path(__file__))]
-    command = [sys.executable, *program, *args]
-    process = subprocess.Popen(
-        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+def cost(path: Path, began_at: float, ended_at: float) -> dict[str, float]:
+    """Return the CPU seconds a second of one process and of the bus in it, within a window."""
+    lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    inside = [line for line in lines if began_at <= line["at"] <= ended_at]
+    first, last = (inside[0], inside[-1]) if len(inside) > 1 else (lines[0], lines[-1])
+    seconds = last["at"] - first["at"]
+    threads = sum(
+        used - first["threads"].get(name, 0.0)
+        for name, used in last["threads"].items()
+        if not name.startswith(RERUN_THREADS)
     )
-    try:
-        yield process
-    finally:
-        process.kill()
-        process.wait()
-        if process.stdout:
-            process.stdout.close()
-
-
-def measure(smoke: bool) -> dict[str, Any]:
-    """Return everything measured, in the form of ``riposte bench``."""
-    rounds = 10 if smoke else 200
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-    runs: list[dict[str, float]] = []
-    codec_figures = codec(5 * rounds)
-    size = int(codec_figures["payload_bytes"])
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        start("--run", folder, "--listen", endpoint, module="services.router") as router,
-        start("--answer", endpoint) as learner,
-        contextlib.closing(
-            open_zenoh(BusConfig(connect=(endpoint,)), "actor-0", SystemClock(), RUN)
-        ) as bus,
-    ):
-        deadline = time.monotonic() + 20
-        while "learner" not in bus.alive("learner"):
-            if time.monotonic() > deadline:
-                raise SystemExit("the learner did not come up within 20 s")
-            bus.wait(0.1)
-        processes = [psutil.Process(), psutil.Process(router.pid), psutil.Process(learner.pid)]
-        rollouts(bus, 10, processes)
-        for _ in range(1 if smoke else 5):
-            limit = bare_tcp(rounds, size)
-            runs.append({**rollouts(bus, rounds, processes), "bare_tcp_mb_per_s": limit})
-        trips = round_trips(bus, 5 * rounds)
-
-    def middle(name: str) -> float:
-        return statistics.median(run[name] for run in runs)
-
     return {
-        "name": "bus",
-        "value": middle("mb_per_s"),
-        "unit": "MB/s of acknowledged rollouts",
-        "limit": middle("bare_tcp_mb_per_s"),
-        "ratio": statistics.median(run["mb_per_s"] / run["bare_tcp_mb_per_s"] for run in runs),
-        "runs": runs,
-        "cpu_s": sum(run["cpu_s"] for run in runs),
-        "wall_s": sum(run["wall_s"] for run in runs),
-        "commit": commit(),
-        "codec": codec_figures,
-        "round_trip": trips,
-        "cpu_ms_per_mb": middle("cpu_ms_per_mb"),
-        "cpu_us_per_sample": middle("cpu_us_per_sample"),
+        "process": (last["process"] - first["process"]) / seconds,
+        "bus": (last["calls"] - first["calls"] + threads) / seconds,
+        "bus_calls": (last["calls"] - first["calls"]) / seconds,
     }
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--smoke", action="store_true", help="a few seconds, numbers mean nothing")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--answer", metavar="ENDPOINT", help=argparse.SUPPRESS)
-    parser.add_argument("--sink", type=int, help=argparse.SUPPRESS)
-    args = parser.parse_args()
-    if args.answer:
-        answer(args.answer)
-    elif args.sink:
-        sink(args.sink)
-    else:
-        found = measure(args.smoke)
-        if args.json:
-            print(json.dumps(found))
-            return
-        trip = found["round_trip"]
-        print("codec       encode {encode_us:.0f} µs, decode {decode_us:.0f} µs for "
-              "{payload_bytes} B".format(**found["codec"]))  # fmt: skip
-        print(f"round trip  p50 {trip['p50_ms']:.2f} ms, p99 {trip['p99_ms']:.2f} ms")
-        print(
-            f"rollouts    {found['value']:.0f} MB/s of {found['limit']:.0f} MB/s bare TCP "
-            f"({found['ratio']:.2f}), {found['cpu_ms_per_mb']:.2f} CPU ms/MB, "
-            f"{found['cpu_us_per_sample']:.3f} CPU µs/sample, all processes"
-        )
+def share_of_a_run(seconds: float) -> dict[str, Any]:
+    """Return what one training run spent, and on the bus, in CPU seconds a second."""
+    with training_run(ENDLESS, wrap=["benchmarks.counted_service"]) as run:
+        window = run.window(seconds)
+        found = {
+            path.stem: cost(path, window["began_at"], window["ended_at"])
+            for path in (run.folder / "bus-cost").glob("*.jsonl")
+        }
+    router = window["cpu_s_by_process"]["router-0"] / (window["ended_at"] - window["began_at"])
+    found["router-0"] = {"process": router, "bus": router, "bus_calls": 0.0}
+    bus = sum(cost["bus"] for cost in found.values())
+    all_of_it = sum(cost["process"] for cost in found.values())
+    return {
+        "ratio": bus / all_of_it,
+        "bus_cpu": bus,
+        "all_cpu": all_of_it,
+        "bus_us_per_sample": 1e6 * bus / window["samples_per_s"],
+        "samples_per_s": window["samples_per_s"],
+        "by_process": found,
+    }
 
 
-if __name__ == "__main__":
-    main()
+def measure(smoke: bool) -> Measurement:
+    """Return the share of the bus in a training run, and the bus's own figures."""
+    seconds, rounds = (1.0, 1) if smoke else (20.0, 3)
+    runs = tuple(share_of_a_run(seconds) for _ in range(rounds))
+    alone = throughput.figures(smoke)
+    trip, codec = alone["round_trip"], alone["codec"]
+    return Measurement(
+        value=median(runs, "bus_cpu"),
+        unit="CPU seconds a second",
+        limit=median(runs, "all_cpu"),
+        ratio=Check(
+            name="bus and codec / CPU of all processes",
+            value=median(runs, "ratio"),
+            goal=GOAL,
+            goal_is="at most",
+        ),
+        runs=runs,
+        checks=(
+            Check(name="bus CPU a sample", value=median(runs, "bus_us_per_sample"), unit="us"),
+            Check(name="acknowledged rollouts", value=alone["mb_per_s"], unit="MB/s"),
+            Check(name="the same over bare TCP", value=alone["bare_tcp_mb_per_s"], unit="MB/s"),
+            Check(name="encode a rollout", value=codec["encode_us"], unit="us"),
+            Check(name="decode and check a rollout", value=codec["decode_us"], unit="us"),
+            Check(name="round trip, p50", value=trip["p50_ms"], unit="ms"),
+            Check(name="round trip, p99", value=trip["p99_ms"], unit="ms"),
+        ),
+        details=alone,
+    )
