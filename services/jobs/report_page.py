@@ -126,7 +126,7 @@ def _evaluation(summary: Summary) -> Node:
     words = (
         f"Antagonist's score a bout, mean and 95 % bootstrap interval over {number} whole bouts "
         "each, by players as they were at the end of each stage, without exploration noise. "
-        "Below: how much of all points given and taken came from camping."
+        "Under it: the share of all points given and taken that came from camping."
     )
     rows = [
         (

@@ -14,7 +14,7 @@ def headline(summary: Summary) -> str:
     effort = f"{count_text(summary.samples)} samples in {duration_text(summary.seconds)}"
     if not summary.finished:
         running = next((s for s in reversed(summary.stages) if s.ended == "no"), None)
-        where = "between stages"
+        where = "between stages" if summary.stages else "no stage has begun"
         if running is not None:
             where = (
                 f"in stage {running.index + 1}, {running.agent} at update {running.updates} "

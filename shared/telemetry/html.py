@@ -40,7 +40,7 @@ figure img { border-radius: 10px; }
 .pictures { display: grid; grid-template-columns: 1fr 1fr; gap: 0 18px; }
 .pictures figure:first-child { grid-column: 1 / -1; }
 .pictures figure { margin: .5em 0; }
-.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(165px, 1fr)); gap: 12px;
+.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(148px, 1fr)); gap: 12px;
   margin: 1.6em 0; }
 .tile { background: var(--card); border: 1px solid var(--line); border-radius: 10px;
   padding: 14px 16px; }
