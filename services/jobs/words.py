@@ -59,15 +59,16 @@ def interval_text(score: Score, *, sign: bool = True) -> str:
 
 
 def _claim(difference: Difference) -> str:
-    gain = f"{points_text(difference.score.mean, sign=False)} points a bout"
-    reach = f"95 %: {interval_text(difference.score, sign=False)}"
+    score = difference.score
+    size = f"{points_text(abs(score.mean), sign=False)} points a bout"
+    reach = f"95 %: {interval_text(score, sign=False)}"
     goal = "goal met" if difference.met else f"short of {points_text(difference.goal, sign=False)}"
     if difference.kind == "lowers":
-        who = (
-            f"protagonist {difference.iteration} takes {gain} off the antagonist it trained against"
-        )
+        does = f"takes {size} off" if score.mean >= 0 else f"gives {size} more to"
+        who = f"protagonist {difference.iteration} {does} the antagonist it trained against"
     else:
-        who = f"antagonist {difference.iteration + 1} wins {gain} back from it"
+        does = f"wins {size} back from" if score.mean >= 0 else f"loses {size} more against"
+        who = f"antagonist {difference.iteration + 1} {does} protagonist {difference.iteration}"
     return f"{who} ({reach}; {goal})"
 
 

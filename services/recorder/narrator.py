@@ -43,6 +43,7 @@ class Narrator:
         self._stage = ""
         self._message = ""
         self._page = ""
+        self._page_due = 0.0
 
     def say(self, source: str, text: str, level: Level = "INFO") -> None:
         """Add a line to the log of events."""
@@ -133,8 +134,8 @@ class Narrator:
             if due and process.heard_at > process.drawn_at:
                 process.drawn_at = now
                 self._draw(name, process)
-        if (page := self._status_page()) != self._page:
-            self._page = page
+        if now >= self._page_due and (page := self._status_page()) != self._page:
+            self._page, self._page_due = page, now + CURVE_PERIOD
             self._recording.document(paths.LEAGUE_STATE, page, self._clock.wall_ns())
 
     def _draw(self, name: str, process: _Process) -> None:

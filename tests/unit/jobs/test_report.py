@@ -9,16 +9,27 @@ import pytest
 from services.jobs import report
 from services.jobs.pictures import Moment, caption, choose
 from services.jobs.report import write_report
-from services.jobs.summary import Summary, bins
+from services.jobs.summary import Score, Summary, bins
 from services.jobs.words import clock_text, duration_text, headline, points_text, summary_text
 from services.league.history import CurvePoint
 from shared.errors import ConfigError, LedgerError
 from tests.unit.jobs.ledgers import BOUTS, SAMPLES, UPDATES, empty_run, finished_run, stopped_run
 
 
-def test_the_summary_holds_the_ledgers_numbers(tmp_path: Path) -> None:
-    summary = write_report(finished_run(tmp_path), pictures=False)
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a finished run with its report; not to be changed."""
+    folder = finished_run(tmp_path_factory.mktemp("run"))
+    write_report(folder, pictures=False)
+    return folder
 
+
+@pytest.fixture(scope="module")
+def summary(run: Path) -> Summary:
+    return msgspec.json.decode((run / "summary.json").read_bytes(), type=Summary)
+
+
+def test_the_summary_holds_the_ledgers_numbers(summary: Summary) -> None:
     assert summary.finished
     assert summary.seed == 7
     assert summary.samples == 4 * UPDATES * SAMPLES
@@ -37,9 +48,7 @@ def test_the_summary_holds_the_ledgers_numbers(tmp_path: Path) -> None:
     assert summary.repeated_rollouts == 0
 
 
-def test_the_two_differences_of_the_goal_are_found(tmp_path: Path) -> None:
-    summary = write_report(finished_run(tmp_path), pictures=False)
-
+def test_the_two_differences_of_the_goal_are_found(summary: Summary) -> None:
     lowers, recovers = summary.headline_differences
     assert (lowers.kind, lowers.iteration, lowers.met) == ("lowers", 1, True)
     assert (recovers.kind, recovers.iteration, recovers.met) == ("recovers", 1, True)
@@ -48,9 +57,23 @@ def test_the_two_differences_of_the_goal_are_found(tmp_path: Path) -> None:
     assert "goal met" in headline(summary)
 
 
-def test_points_by_rule_add_up_to_the_score(tmp_path: Path) -> None:
+def test_training_that_made_things_worse_is_said_in_plain_words(tmp_path: Path) -> None:
     summary = write_report(finished_run(tmp_path), pictures=False)
+    worse = [
+        msgspec.structs.replace(
+            d, met=False, score=Score(mean=-900, low=-1000, high=-800, bouts=64)
+        )
+        for d in summary.headline_differences
+    ]
 
+    text = headline(msgspec.structs.replace(summary, headline_differences=tuple(worse)))
+
+    assert "protagonist 1 gives 900 points a bout more to the antagonist" in text
+    assert "antagonist 2 loses 900 points a bout more against protagonist 1" in text
+    assert "short of 1,500" in text
+
+
+def test_points_by_rule_add_up_to_the_score(summary: Summary) -> None:
     for meeting in summary.meetings:
         assert meeting.score is not None
         given = meeting.attack_points + meeting.penalty_points + meeting.camping_points
@@ -78,10 +101,8 @@ def test_a_second_report_has_the_same_numbers_and_the_first_ones_origin(tmp_path
     assert len((tmp_path / "report.html").read_bytes()) == pytest.approx(len(page), abs=400)
 
 
-def test_the_page_says_what_happened_and_escapes_it(tmp_path: Path) -> None:
-    write_report(finished_run(tmp_path), pictures=False)
-
-    page = (tmp_path / "report.html").read_text()
+def test_the_page_says_what_happened_and_escapes_it(run: Path) -> None:
+    page = (run / "report.html").read_text()
     assert "actor-0 &lt;killed by signal 9&gt; &amp; started again" in page
     assert "1 x process restarted" in page
     assert "antagonist learns (2)" in page
@@ -111,8 +132,8 @@ def test_a_run_that_has_just_begun_has_a_report(tmp_path: Path) -> None:
     assert (tmp_path / "report.html").exists()
 
 
-def test_the_text_fits_on_one_screen(tmp_path: Path) -> None:
-    lines = summary_text(write_report(finished_run(tmp_path), pictures=False)).splitlines()
+def test_the_text_fits_on_one_screen(summary: Summary) -> None:
+    lines = summary_text(summary).splitlines()
 
     assert len(lines) <= 30
     assert max(len(line) for line in lines) <= 120
