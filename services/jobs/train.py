@@ -13,7 +13,7 @@ import socket
 import sys
 import threading
 import webbrowser
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,7 +51,7 @@ ROUTER_SECONDS = 60.0
 EXIT_INTERRUPTED = 130
 
 
-class Stopped(Exception):
+class StopAsked(Exception):  # noqa: N818 - it is no error
     """The person at the terminal asked to stop."""
 
 
@@ -76,7 +76,7 @@ def main(argv: Sequence[str]) -> int:
                     _train_serially(settings, folder, run, found.resume, stop)
                 else:
                     _train(settings, folder, run, stop, view=found.view)
-            except Stopped:
+            except StopAsked:
                 print(f"\nstopped; continue with: riposte train --resume --out {folder}")
                 return EXIT_INTERRUPTED
         return _conclude(folder)
@@ -96,9 +96,7 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the run")
     parser.add_argument("--resume", action="store_true", help="continue the run in --out")
     parser.add_argument("--serial", action="store_true", help="one process, same seed same bits")
-    parser.add_argument(
-        "--view", action="store_true", help="open the live view in a browser"
-    )
+    parser.add_argument("--view", action="store_true", help="open the live view in a browser")
     parser.add_argument(
         "--set", action="append", default=[], dest="overrides", metavar="SECTION.KEY=VALUE",
         help="over the site file; may be repeated",
@@ -216,9 +214,7 @@ def _train(
     # Runs side by side need a port each; a site file that names one gets that one.
     is_named = settings.bus.listen != BusConfig().listen
     endpoint = settings.bus.listen[0] if is_named else f"tcp/127.0.0.1:{free_port()}"
-    atomic_write(
-        folder / "endpoint.json", json.dumps({"connect": endpoint, "run": run}).encode()
-    )
+    atomic_write(folder / "endpoint.json", json.dumps({"connect": endpoint, "run": run}).encode())
     supervisor = Supervisor(processes(settings, folder, run, endpoint), folder / "logs", clock)
     try:
         started = supervisor.start()
@@ -232,7 +228,7 @@ def _train(
             watcher.tell(started)
             while not watcher.finished:
                 if stop.is_set():
-                    raise Stopped
+                    raise StopAsked
                 watcher.tick()
                 if view and (live := read_live_view(folder)) is not None:
                     view = False
@@ -253,7 +249,7 @@ def _wait_for_router(endpoint: str, supervisor: Supervisor, stop: threading.Even
     host, _, port = endpoint.partition("/")[2].rpartition(":")
     for _ in range(round(ROUTER_SECONDS / POLL_SECONDS)):
         if stop.is_set():
-            raise Stopped
+            raise StopAsked
         for event in supervisor.poll():
             if event.kind == "gave_up":
                 raise RiposteError(f"{event.describe}\n{event.tail}".rstrip())
@@ -322,7 +318,7 @@ class _Watcher:
 
 
 @contextlib.contextmanager
-def _dashboard(bus: Bus, clock: SystemClock, folder: Path) -> "Iterator[Dashboard]":
+def _dashboard(bus: Bus, clock: SystemClock, folder: Path) -> "Generator[Dashboard]":
     """Show where the run stands for as long as the block lasts."""
     from services.jobs.dashboard import Dashboard
 
@@ -347,7 +343,7 @@ def _train_serially(
         with _dashboard(bus, SystemClock(), folder) as dashboard:
             while not serial.finished:
                 if stop.is_set():
-                    raise Stopped
+                    raise StopAsked
                 serial.tick()
                 dashboard.tick({})
 

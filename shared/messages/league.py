@@ -103,7 +103,7 @@ class Schedule(Message, frozen=True, kw_only=True):
 
 
 class BoutResults(Message, frozen=True, kw_only=True):
-    """Bouts that one actor finished under one lease, the points split by the rule that gave them."""
+    """Bouts that one actor finished under one lease, points split by the rule that gave them."""
 
     actor: str
     boot: str

@@ -33,7 +33,7 @@ class Qos(enum.Enum):
     """How a topic travels."""
 
     LATEST = "latest"
-    """Newest value wins; the owner re-sends it every second, so late joiners and healed links get it."""
+    """Newest value wins; re-sent every second, so that late joiners and healed links get it."""
     STREAM = "stream"
     """Every value once, dropped where a reader is slow; for viewers."""
     REQUEST = "request"
@@ -74,6 +74,7 @@ class Service(Generic[M, R]):
 KIB = 1024
 MIB = 1024 * KIB
 
+# fmt: off
 ROLLOUT = Service(
     "learner/{agent}/rollout", Rollout, Receipt, 8 * MIB, 4 * KIB, "actor", "learner",
     "T x N steps; acknowledged when a checkpoint holds the update made from them", acked=True,
@@ -122,7 +123,15 @@ FRAMES = Topic(
     "a sampled bout to look at",
 )
 
+# fmt: on
+
 SERVICES: tuple[Service[Any, Any], ...] = (
-    ROLLOUT, RESULTS, VERSION, INCIDENT, LEASE, RENEWAL, SNAPSHOT,
+    ROLLOUT,
+    RESULTS,
+    VERSION,
+    INCIDENT,
+    LEASE,
+    RENEWAL,
+    SNAPSHOT,
 )
 TOPICS: tuple[Topic[Any], ...] = (POLICY, SCHEDULE, PROGRESS, STATUS, FRAMES)
