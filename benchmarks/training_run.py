@@ -12,10 +12,11 @@ from typing import Any
 import psutil
 
 from services.jobs.settings import Settings
-from services.jobs.train import free_port, processes
+from services.jobs.train import processes
 from services.league.history import RunState, VersionRecord
 from services.league.ledger import open_read_only
 from services.supervisor import ProcessSpec, Supervisor
+from shared.bus.ports import free_port
 from shared.clock import SystemClock
 from shared.errors import LedgerError, RiposteError
 
@@ -86,12 +87,12 @@ class TrainingRun:
 
     def delay_seconds(self) -> float:
         """Return how long their threads were ready to run and had no core."""
-        schedstats = (
-            path
-            for pid in self._supervisor.pids.values()
-            for path in Path(f"/proc/{pid}/task").glob("*/schedstat")
-        )
-        return sum(int(path.read_text().split()[1]) for path in schedstats) / 1e9
+        total = 0
+        for pid in self._supervisor.pids.values():
+            for path in Path(f"/proc/{pid}/task").glob("*/schedstat"):
+                with contextlib.suppress(OSError):  # that thread ended just now
+                    total += int(path.read_text(encoding="ascii").split()[1])
+        return total / 1e9
 
     def resident_mib(self) -> dict[str, float]:
         """Return the memory each process holds."""

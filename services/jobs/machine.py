@@ -15,6 +15,7 @@ import psutil
 from services.jobs.finding import Finding
 from shared.bus.base import Bus
 from shared.bus.config import BusConfig
+from shared.bus.ports import free_port
 from shared.clock import Clock, SystemClock
 from shared.errors import RiposteError
 from shared.messages.league import Incident
@@ -110,13 +111,6 @@ def is_port_free(port: int) -> bool:
         except OSError:
             return False
         return True
-
-
-def free_port() -> int:
-    """Return a TCP port of the loopback that is free now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def check_bus() -> Finding:

@@ -25,6 +25,7 @@ from services.supervisor import ProcessEvent, ProcessSpec, Supervisor, service_c
 from shared.bus.base import Bus
 from shared.bus.config import BusConfig
 from shared.bus.delivery import Outbox
+from shared.bus.ports import free_port
 from shared.clock import SystemClock
 from shared.errors import ConfigError, RiposteError
 from shared.messages.league import Incident
@@ -175,13 +176,6 @@ def _conclude(folder: Path) -> int:
 
 
 # -- many processes ---------------------------------------------------------------------------
-
-
-def free_port() -> int:
-    """Return a TCP port of the loopback that nobody listens on now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def processes(settings: Settings, folder: Path, run: str, endpoint: str) -> list[ProcessSpec]:

@@ -14,6 +14,7 @@ from services.recorder.config import RecorderConfig
 from services.recorder.narrator import Narrator
 from services.recorder.playback import Playback
 from shared.bus.base import Bus
+from shared.bus.ports import free_port
 from shared.clock import Clock
 from shared.errors import RiposteError
 from shared.messages.live import BoutFrames
@@ -27,7 +28,7 @@ from shared.telemetry.layout import training_layout
 from shared.telemetry.recording import LivePorts, Recording
 from shared.telemetry.rrd import next_recording, recordings, trim
 from shared.telemetry.scene import Scene
-from shared.telemetry.viewer import WebViewer, free_port
+from shared.telemetry.viewer import WebViewer
 
 DISK_PERIOD = 5.0
 """Seconds from one look at the free space to the next."""

@@ -15,6 +15,10 @@ MAX_MESSAGE = max(
 ) + MIB  # fmt: skip
 """Nothing longer leaves the network layer (bytes)."""
 
+SHARED_MEMORY_POOL = 6 * MIB
+"""What one process passes to others at a time (bytes); what does not fit goes through the socket.
+Whoever gets something maps the whole pool of its sender, so it counts once in each process."""
+
 _ENDPOINT = re.compile(r"(tcp|tls|quic|ws)/(\[[0-9a-fA-F:.]+\]|[^:/\[\]]+):[0-9]{1,5}")
 
 
@@ -140,6 +144,9 @@ def _common(cfg: BusConfig) -> dict[str, Any]:
                     },
                 },
             },
-            "shared_memory": {"enabled": cfg.shared_memory},
+            "shared_memory": {
+                "enabled": cfg.shared_memory,
+                "transport_optimization": {"pool_size": SHARED_MEMORY_POOL},
+            },
         },
     }

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import msgspec
 
+from shared.bus.ports import LOOPBACK, free_port
 from shared.clock import Clock
-from shared.telemetry.viewer import HOST, free_port
 
 MOST = 16
 """Visitors at once; more are not let in until one has left."""
@@ -62,7 +62,7 @@ class FrontDoor:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            self._socket.bind((HOST, free_port(port)))
+            self._socket.bind((LOOPBACK, free_port(port)))
             self._socket.listen(MOST)
         except OSError:
             self._socket.close()
@@ -72,7 +72,7 @@ class FrontDoor:
     @property
     def url(self) -> str:
         """Return the short address."""
-        return f"http://{HOST}:{self._socket.getsockname()[1]}"
+        return f"http://{LOOPBACK}:{self._socket.getsockname()[1]}"
 
     def tick(self) -> None:
         """Let visitors in and answer those who have asked."""

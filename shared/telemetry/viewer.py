@@ -11,28 +11,14 @@ from collections.abc import Sequence
 from importlib import util
 from pathlib import Path
 
+from shared.bus.ports import LOOPBACK, free_port
 from shared.errors import RiposteError
-
-HOST = "127.0.0.1"
-
-
-def free_port(wanted: int = 0) -> int:
-    """Return ``wanted`` where it is free on the loopback, else another free port."""
-    for port in (wanted, 0):
-        with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                probe.bind((HOST, port))
-            except OSError:
-                continue
-            return probe.getsockname()[1]
-    raise RiposteError(f"no free port on {HOST}; close something that listens there")
 
 
 def page_url(web_port: int, sources: Sequence[str]) -> str:
     """Return the address of the page that shows what ``sources`` serve, merged."""
     query = urllib.parse.urlencode([("url", source) for source in sources])
-    return f"http://{HOST}:{web_port}/?{query}"
+    return f"http://{LOOPBACK}:{web_port}/?{query}"
 
 
 class WebViewer:
@@ -58,10 +44,10 @@ class WebViewer:
         files = not all(source.startswith("rerun+") for source in sources)
         grpc_port = free_port()
         command = [
-            *launcher, str(viewer_program()), *sources, "--serve-web", "--bind", HOST,
+            *launcher, str(viewer_program()), *sources, "--serve-web", "--bind", LOOPBACK,
             "--web-viewer-port", str(self.web_port), "--port", str(grpc_port),
         ]  # fmt: skip
-        shown = [f"rerun+http://{HOST}:{grpc_port}/proxy"] if files else sources
+        shown = [f"rerun+http://{LOOPBACK}:{grpc_port}/proxy"] if files else sources
         self.url = page_url(self.web_port, shown)
         try:
             self._process = subprocess.Popen(
@@ -90,7 +76,7 @@ class WebViewer:
             if not self.alive:
                 return False
             with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-                if probe.connect_ex((HOST, self.web_port)) == 0:
+                if probe.connect_ex((LOOPBACK, self.web_port)) == 0:
                     return True
             pause.wait(0.05)
         return False

@@ -10,9 +10,10 @@ import pytest
 
 from services import cli
 from services.jobs import machine
-from services.jobs.machine import check_bus, free_port
+from services.jobs.machine import check_bus
 from services.jobs.status import main as status
 from shared.bus.config import BusConfig
+from shared.bus.ports import free_port
 from shared.bus.zenoh import open_router, open_zenoh
 from shared.clock import SystemClock
 from shared.runtime.service import Health, run

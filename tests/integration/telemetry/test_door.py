@@ -3,9 +3,10 @@ from pathlib import Path
 
 import pytest
 
+from shared.bus.ports import free_port
 from shared.clock import ManualClock
 from shared.telemetry.door import MOST, FrontDoor, LiveView, read_live_view
-from shared.telemetry.viewer import free_port, page_url
+from shared.telemetry.viewer import page_url
 
 
 def visit(door: FrontDoor) -> socket.socket:
