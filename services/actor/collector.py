@@ -55,7 +55,10 @@ def staggered_starts(num_envs: int, bout_steps: int, rollout_steps: int) -> NDAr
 
 
 def results_of(
-    env: FencingEnv, worlds: NDArray[np.int64], bouts: NDArray[np.int64], complete: NDArray[np.bool_]
+    env: FencingEnv,
+    worlds: NDArray[np.int64],
+    bouts: NDArray[np.int64],
+    complete: NDArray[np.bool_],
 ) -> Results:
     """Return the scoreboard of these worlds under their bout numbers."""
     scores = env.scores

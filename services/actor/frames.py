@@ -8,6 +8,8 @@ from shared.game.bout import Judgement
 from shared.messages.live import BoutFrames
 from shared.sim.env import FencingEnv
 
+Float32s = NDArray[np.float32]
+
 WORLD = 0
 """The world that viewers see."""
 
@@ -30,8 +32,7 @@ class FrameSampler:
         self._every = every_steps
         self._following = False
         self._not_before = clock.now()
-        self._frames: list[tuple[int, NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]]
-        self._frames = []
+        self._frames: list[tuple[int, Float32s, Float32s, Float32s]] = []
         self._marks: list[tuple[float, bool, bool, bool]] = []
 
     def abandon(self) -> None:

@@ -4,7 +4,6 @@ from collections import OrderedDict
 
 from shared.bus.base import Bus, NoAnswer, Pending, Refused
 from shared.clock import Clock
-from shared.errors import SnapshotError
 from shared.messages.league import SnapshotReply, SnapshotRequest
 from shared.messages.topics import SNAPSHOT
 from shared.policy.mlp import GaussianPolicy

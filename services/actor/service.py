@@ -324,9 +324,7 @@ class Actor:
         antagonist, protagonist = players
         if antagonist is None or protagonist is None:
             return False
-        self._evaluation = Evaluation(
-            self._env, (antagonist, protagonist), lease.bouts, lease.seed
-        )
+        self._evaluation = Evaluation(self._env, (antagonist, protagonist), lease.bouts, lease.seed)
         return True
 
     def _player(self, reference: str, stochastic: bool) -> Player | None:

@@ -40,12 +40,12 @@ class TrainConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 BUDGETS: dict[str, tuple[str, ...]] = {
     "quick": (
         "league.antagonist_updates=50",
-        "league.protagonist_updates=60",
+        "league.protagonist_updates=80",
         "league.evaluation_bouts=64",
     ),
     "standard": (),
     "paper": (
-        "league.antagonist_updates=300",
+        "league.antagonist_updates=200",
         "league.protagonist_updates=600",
         "league.evaluation_bouts=256",
     ),

@@ -10,15 +10,15 @@ class LeagueConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """Seed of the run; every lease's seed follows from it."""
     iterations: int = 2
     """Iterations of phase one; in each the antagonist learns first, then the protagonist."""
-    antagonist_updates: int = 80
+    antagonist_updates: int = 60
     """Most PPO updates of the antagonist in one stage."""
-    protagonist_updates: int = 120
+    protagonist_updates: int = 160
     """Most PPO updates of the protagonist in one stage."""
     score_weights: tuple[float, ...] = (1.0,)
     """Factor of the game score in the reward, by iteration; the last one holds for the rest."""
-    shaping_weights: tuple[float, ...] = (0.3,)
+    shaping_weights: tuple[float, ...] = (0.4,)
     """Factor of the continuous reward, by iteration; the last one holds for the rest."""
-    convergence_min_updates: int = 60
+    convergence_min_updates: int = 120
     """A stage is not called converged before this many updates; 0 never ends a stage early."""
     convergence_window: int = 20
     """Updates in each of the two adjacent windows whose mean scores are compared."""

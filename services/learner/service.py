@@ -260,9 +260,8 @@ class Learner:
     def _repeated(self, request: Request[Rollout, Receipt]) -> None:
         """Answer a rollout that has been learned from, once its version is in the ledger."""
         self._counters["rollouts_repeated"] += 1
-        if self._announced and request.message.name not in self._meta.rollouts:
-            request.reply(Receipt(accepted=True))
-        elif not self._reports.unacknowledged:
+        is_entered = not self._reports.unacknowledged
+        if is_entered or request.message.name not in self._meta.rollouts:
             request.reply(Receipt(accepted=True))
         else:
             request.refuse("its version is being entered in the ledger", retry=True)

@@ -21,7 +21,7 @@ class RewardConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """Reward for one point of the game; keeps the +-10 of penalty and camping near one."""
     reach: float = 0.5
     """Distance (m) at which the closeness terms have fallen to 1/e."""
-    guard_weight: float = 0.3
+    guard_weight: float = 0.25
     """Share of the protagonist's shaping that is for staying close to an attacking bat."""
 
     def __post_init__(self) -> None:
