@@ -3,27 +3,21 @@
 import dataclasses
 from typing import Any
 
-import msgspec
 import structlog
 from numpy.typing import NDArray
 
 from services.actor.collector import Collector, Evaluation, Results, Segment
 from services.actor.config import ActorConfig
 from services.actor.frames import WORLD, FrameSampler
+from services.actor.leasing import LeaseKeeper
 from services.actor.opponents import Opponents
-from shared.bus.base import Bus, NoAnswer, Pending, Refused
+from shared.bus.base import Bus
 from shared.bus.delivery import Outbox
 from shared.clock import Clock
 from shared.errors import SnapshotError
 from shared.game.reward import RewardConfig
-from shared.messages.league import (
-    BoutResults,
-    Lease,
-    LeaseRenewal,
-    LeaseRequest,
-    LeaseStatus,
-)
-from shared.messages.topics import FRAMES, LEASE, POLICY, RENEWAL, RESULTS, ROLLOUT, SCHEDULE
+from shared.messages.league import BoutResults, Lease, Stage
+from shared.messages.topics import FRAMES, POLICY, RESULTS, ROLLOUT
 from shared.messages.training import AGENTS, Agent, PolicyAnnouncement, Receipt, Rollout
 from shared.policy.mlp import GaussianPolicy
 from shared.policy.players import Player
@@ -36,8 +30,8 @@ log = structlog.get_logger()
 
 Arrays = dict[str, NDArray[Any]]
 
-LEASE_RETRY = 0.2
-"""Seconds between two requests for work."""
+UNPLAYABLE_SECONDS = 1.0
+"""Before the next request for work when a lease could not be played."""
 RESULTS_WINDOW = 256
 """Result messages that may wait for the league."""
 
@@ -98,17 +92,13 @@ class Actor:
             bus, RESULTS, clock, window=RESULTS_WINDOW, timeout=cfg.ask_timeout
         )
         self._policies = {agent: bus.subscribe(POLICY, agent=agent) for agent in AGENTS}
-        self._schedule = bus.subscribe(SCHEDULE)
         self._learning: dict[Agent, LearningPolicy] = {}
         self._frames = FrameSampler(env, clock, cfg.frame_period, cfg.frame_steps)
-        self._lease: Lease | None = None
+        self._keeper = LeaseKeeper(bus, clock, cfg.num_envs, cfg.ask_timeout)
+        self._playing = ""
+        """Name of the lease that collector or evaluation belong to."""
         self._collector: Collector | None = None
         self._evaluation: Evaluation | None = None
-        self._requested: Pending[Lease] | None = None
-        self._ask_at = clock.now()
-        self._renewing: Pending[LeaseStatus] | None = None
-        self._renew_at = 0.0
-        self._expires_at = 0.0
         self._rollout_sequence = 0
         self._result_sequence = 0
         self._resume: tuple[Arrays, dict[str, Any]] | None = None
@@ -137,15 +127,16 @@ class Actor:
         """Do one piece of work: at most one rollout, or as many steps of an evaluation."""
         did = self._pump()
         did |= self._take_policies()
-        did |= self._take_schedule()
-        if self._lease is None:
-            return self._seek_lease() or did
-        self._keep_lease()
-        if self._lease is None:
-            return True
+        did |= self._keeper.tick()
+        lease = self._keeper.lease
+        if lease is None or lease.lease != self._playing:
+            self._forget()
+        if lease is None:
+            self._wait_for(self._keeper.waiting_for or "league: a lease")
+            return did
         if self._collector is None and self._evaluation is None:
-            return self._start() or did
-        return (not self.paused and self._play()) or did
+            return self._start(lease) or did
+        return (not self.paused and self._play(lease)) or did
 
     def _pump(self) -> bool:
         """Hand over what is due, and count what was answered."""
@@ -179,122 +170,51 @@ class Actor:
     def _take_policies(self) -> bool:
         """Take the newest announced policies; one that does not fit is said and not used."""
         did = False
-        for agent, subscription in self._policies.items():
+        for subscription in self._policies.values():
             while (announcement := subscription.take()) is not None:
                 did = True
-                self._learn_of(agent, announcement)
+                self._learn_of(announcement)
         return did
 
-    def _take_schedule(self) -> bool:
-        """Leave a stage as soon as the league has, without waiting for the renewal to say so."""
-        did = False
-        while (schedule := self._schedule.take()) is not None:
-            did = True
-            played = self._lease.stage if self._lease else None
-            if played is not None and (
-                schedule.stage is None or schedule.stage.index > played.index
-            ):
-                self._drop_lease("stage over")
-        return did
-
-    def _learn_of(self, agent: Agent, announcement: PolicyAnnouncement) -> None:
+    def _learn_of(self, announcement: PolicyAnnouncement) -> None:
         try:
             snapshot = unpack(announcement.payload.tobytes(), announcement.snapshot)
             snapshot.check_fits(self._fit)
         except SnapshotError as error:
             self._last_error = str(error)
-            log.error("policy_refused", agent=agent, reason=str(error))
+            log.error("policy_refused", agent=announcement.agent, reason=str(error))
             return
-        self._learning[agent] = LearningPolicy(
+        self._learning[announcement.agent] = LearningPolicy(
             GaussianPolicy(snapshot.weights), announcement.policy_version, snapshot.digest
         )
 
     # -- the lease --------------------------------------------------------------------------
 
-    def _seek_lease(self) -> bool:
-        """Ask for work, or take the answer."""
-        if self._requested is None:
-            if self._clock.now() < self._ask_at:
-                return False
-            request = LeaseRequest(
-                actor=self._bus.name, boot=self._bus.boot, num_envs=self._env.num_envs
-            )
-            self._requested = self._bus.ask(LEASE, request, self._cfg.ask_timeout)
-            return True
-        answer = self._requested.take()
-        if answer is None:
-            self._wait_for("league: a lease")
-            return False
-        self._requested = None
-        self._ask_at = self._clock.now() + LEASE_RETRY
-        if isinstance(answer, NoAnswer | Refused):
-            self._wait_for(f"league: {answer.reason}")
-            return False
-        if answer.kind == "none":
-            self._wait_for(f"league: {answer.reason or 'no work now'}")
-            return False
-        self._lease = answer
-        self._counters["leases"] += 1
-        now = self._clock.now()
-        self._expires_at = now + answer.expires_in
-        self._renew_at = now + answer.expires_in / 3.0
-        log.info("lease_taken", lease=answer.lease, kind=answer.kind)
-        return True
-
-    def _keep_lease(self) -> None:
-        """Renew the lease in time; drop it when it has ended."""
-        assert self._lease is not None
-        now = self._clock.now()
-        if self._renewing is not None:
-            answer = self._renewing.take()
-            if isinstance(answer, LeaseStatus):
-                self._renewing = None
-                if not answer.alive:
-                    self._drop_lease("ended")
-                    return
-                self._expires_at = now + answer.expires_in
-                self._renew_at = now + answer.expires_in / 3.0
-                self._lease = msgspec.structs.replace(self._lease, window=answer.window)
-            elif answer is not None:
-                self._renewing = None
-                self._renew_at = now + LEASE_RETRY
-        elif now >= self._renew_at:
-            renewal = LeaseRenewal(
-                actor=self._bus.name, boot=self._bus.boot, lease=self._lease.lease
-            )
-            self._renewing = self._bus.ask(RENEWAL, renewal, self._cfg.ask_timeout)
-        if now >= self._expires_at:
-            self._drop_lease("lapsed")
-
-    def _drop_lease(self, why: str) -> None:
-        """Forget what was being played; what was handed over stays in the outboxes."""
-        assert self._lease is not None
-        log.info("lease_dropped", lease=self._lease.lease, why=why)
-        self._lease = None
+    def _forget(self) -> None:
+        """Stop what was being played; what was handed over stays in the outboxes."""
+        self._playing = ""
         self._collector = None
         self._evaluation = None
-        self._renewing = None
         self._frames.abandon()
-        self._ask_at = self._clock.now()
 
-    def _start(self) -> bool:
+    def _start(self, lease: Lease) -> bool:
         """Begin to play the lease once both players are here."""
-        lease = self._lease
-        assert lease is not None
         try:
             if lease.stage is not None:
-                return self._start_training(lease)
-            return self._start_evaluation(lease)
+                started = self._start_training(lease, lease.stage)
+            else:
+                started = self._start_evaluation(lease)
         except SnapshotError as error:
             self._last_error = str(error)
             log.error("lease_refused", lease=lease.lease, reason=str(error))
-            self._drop_lease("unplayable")
-            self._ask_at = self._clock.now() + 1.0
+            self._keeper.drop("unplayable", wait=UNPLAYABLE_SECONDS)
             return False
+        if started:
+            self._playing = lease.lease
+            self._counters["leases"] += 1
+        return started
 
-    def _start_training(self, lease: Lease) -> bool:
-        stage = lease.stage
-        assert stage is not None
+    def _start_training(self, lease: Lease, stage: Stage) -> bool:
         opponent = self._player(stage.opponent, stochastic=lease.stochastic)
         if opponent is None:
             return False
@@ -335,10 +255,8 @@ class Actor:
 
     # -- playing ----------------------------------------------------------------------------
 
-    def _play(self) -> bool:
+    def _play(self, lease: Lease) -> bool:
         """Play one rollout, or a stretch of an evaluation."""
-        lease = self._lease
-        assert lease is not None
         if self._results.full:
             self._wait_for(f"league: {self._results.unacknowledged} results unacknowledged")
             return False
@@ -348,14 +266,13 @@ class Actor:
             self._show(lease, WORLD, (lease.antagonist, lease.protagonist))
             if results is not None:
                 self._report(lease, results, (lease.antagonist, lease.protagonist))
-                self._drop_lease("done")
+                self._keeper.drop("done")
             return True
-        return self._collect(lease)
+        if self._collector is None or lease.stage is None:
+            return False
+        return self._collect(lease, lease.stage, self._collector)
 
-    def _collect(self, lease: Lease) -> bool:
-        stage = lease.stage
-        assert stage is not None
-        assert self._collector is not None
+    def _collect(self, lease: Lease, stage: Stage, collector: Collector) -> bool:
         outbox = self._rollouts[stage.agent]
         outbox.window = lease.window
         if outbox.full:
@@ -364,9 +281,9 @@ class Actor:
             )
             return False
         learning = self._learning[stage.agent]
-        segment = self._collector.collect(learning.policy, self._frames.on_step)
+        segment = collector.collect(learning.policy, self._frames.on_step)
         self._count_steps(self._cfg.rollout_steps)
-        outbox.put(self._rollout(lease, learning, segment))
+        outbox.put(self._rollout(lease, stage, learning, segment))
         self._rollout_sequence += 1
         outbox.pump()
         own = f"sha256:{learning.digest}"
@@ -376,9 +293,9 @@ class Actor:
             self._report(lease, segment.results, pair)
         return True
 
-    def _rollout(self, lease: Lease, learning: LearningPolicy, segment: Segment) -> Rollout:
-        stage = lease.stage
-        assert stage is not None
+    def _rollout(
+        self, lease: Lease, stage: Stage, learning: LearningPolicy, segment: Segment
+    ) -> Rollout:
         return Rollout(
             agent=stage.agent,
             actor=self._bus.name,
@@ -447,26 +364,22 @@ class Actor:
         outboxes = (*self._rollouts.values(), self._results)
         return not (
             any(outbox.unacknowledged for outbox in outboxes)
-            or self._requested
-            or self._renewing
+            or not self._keeper.quiet
             or self._evaluation
         )
 
     @property
     def ready(self) -> bool:
         """Return whether it holds all it needs to play its lease, or has none."""
-        return self._lease is None or self._collector is not None
+        return self._keeper.lease is None or self._collector is not None
 
     def state(self) -> tuple[Arrays, dict[str, Any]]:
         """Return arrays and JSON values from which ``restore`` continues; only when ``quiet``."""
         arrays: Arrays = {}
         values: dict[str, Any] = {
-            "lease": msgspec.to_builtins(self._lease),
+            "keeper": self._keeper.state(),
             "rollout_sequence": self._rollout_sequence,
             "result_sequence": self._result_sequence,
-            "ask_at": self._ask_at,
-            "renew_at": self._renew_at,
-            "expires_at": self._expires_at,
             "collector": None,
         }
         if self._collector is not None:
@@ -475,12 +388,9 @@ class Actor:
 
     def restore(self, arrays: Arrays, values: dict[str, Any]) -> None:
         """Continue from what ``state`` returned, once the players of the lease are here again."""
-        self._lease = msgspec.convert(values["lease"], Lease | None)
+        self._keeper.restore(values["keeper"])
         self._rollout_sequence = int(values["rollout_sequence"])
         self._result_sequence = int(values["result_sequence"])
-        self._ask_at = float(values["ask_at"])
-        self._renew_at = float(values["renew_at"])
-        self._expires_at = float(values["expires_at"])
         if values["collector"] is not None:
             self._resume = (arrays, values["collector"])
 
@@ -488,7 +398,7 @@ class Actor:
 
     def health(self) -> Health:
         """Return how this actor is."""
-        lease = self._lease
+        lease = self._keeper.lease
         if lease is None:
             state = "without a lease"
         elif lease.stage is not None:

@@ -80,8 +80,9 @@ class PolicyOptimiser:
         )
         # A last layer 100 times smaller: a fresh policy holds still (Andrychowicz 2021, sec. 3.2).
         with torch.no_grad():
-            actor.mlp[-1].weight.mul_(0.01)
-            actor.mlp[-1].bias.zero_()
+            last = _linear_layers(actor)[-1]
+            last.weight.mul_(0.01)
+            last.bias.zero_()
         algorithm = PPO(
             actor,
             critic,
@@ -151,7 +152,7 @@ class PolicyOptimiser:
         losses = algorithm.update()
         # Outside its range the clamped deviation has no gradient and would never come back.
         with torch.no_grad():
-            algorithm.actor.distribution.log_std_param.clamp_(
+            _log_std(algorithm.actor).clamp_(
                 math.log(self.cfg.minimum_std), math.log(self.cfg.maximum_std)
             )
         with torch.no_grad():
@@ -203,12 +204,12 @@ class PolicyOptimiser:
     def weights(self) -> PolicyWeights:
         """Return copies of what an actor needs to act."""
         actor = self._algorithm.actor
-        linear = [m for m in actor.mlp if isinstance(m, torch.nn.Linear)]
+        normaliser = actor.obs_normalizer.state_dict()
         return PolicyWeights(
-            obs_mean=_numpy(actor.obs_normalizer._mean[0]),
-            obs_std=_numpy(actor.obs_normalizer._std[0]),
-            layers=tuple((_numpy(m.weight), _numpy(m.bias)) for m in linear),
-            log_std=_numpy(actor.distribution.log_std_param),
+            obs_mean=_numpy(normaliser["_mean"][0]),
+            obs_std=_numpy(normaliser["_std"][0]),
+            layers=tuple((_numpy(m.weight), _numpy(m.bias)) for m in _linear_layers(actor)),
+            log_std=_numpy(_log_std(actor)),
             activation=self.cfg.activation,
         )
 
@@ -259,3 +260,13 @@ def _stack(rollouts: Sequence[Rollout], field: str, rows: int = 2) -> NDArray[np
 
 def _numpy(tensor: torch.Tensor) -> NDArray[np.float32]:
     return tensor.detach().cpu().numpy().astype(np.float32, copy=True)
+
+
+def _linear_layers(model: MLPModel) -> list[torch.nn.Linear]:
+    """Return the layers that have weights, in order."""
+    return [module for module in model.mlp.modules() if isinstance(module, torch.nn.Linear)]
+
+
+def _log_std(actor: MLPModel) -> torch.Tensor:
+    """Return the parameter that holds the log of the standard deviation."""
+    return dict(actor.named_parameters())["distribution.log_std_param"]
