@@ -5,7 +5,6 @@ version in its ledger. Whatever happens before, the actor still has the rollout 
 """
 
 import dataclasses
-from collections import Counter
 from pathlib import Path
 
 import msgspec
@@ -14,27 +13,20 @@ import structlog
 
 from services.learner.checkpoint import CheckpointStore, Meta
 from services.learner.config import LearnerConfig
-from services.learner.gate import (
-    Decision,
-    Ruling,
-    check_contents,
-    check_provenance,
-    check_version,
-)
+from services.learner.intake import Intake
 from services.learner.ppo import PolicyOptimiser, UpdateStats
-from shared.bus.base import Bus, Request
+from shared.bus.base import Bus
 from shared.bus.delivery import Applied, Outbox
 from shared.clock import Clock
 from shared.errors import RiposteError
 from shared.game.rules import RuleBook
-from shared.messages.league import Incident, LeaseSummary, Stage
+from shared.messages.league import Incident
 from shared.messages.message import Bytes
 from shared.messages.topics import INCIDENT, POLICY, ROLLOUT, SCHEDULE, VERSION
 from shared.messages.training import (
     Agent,
     PolicyAnnouncement,
     Receipt,
-    Rollout,
     UpdateMetrics,
     VersionReceipt,
     VersionReport,
@@ -49,12 +41,6 @@ log = structlog.get_logger()
 
 REPORT_TIMEOUT = 5.0
 """Seconds to wait for the league before a version is reported again."""
-UNKNOWN_LEASE_SECONDS = 10.0
-"""How long a rollout may be told to ask again before it is dropped."""
-HELD_BATCHES = 4
-"""Rollouts held at once, in batches; more are told to ask again."""
-
-Held = tuple[Request[Rollout, Receipt], Rollout]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -103,7 +89,9 @@ class Learner:
         self._clock = clock
         self._optimiser = PolicyOptimiser(cfg, _seed_of(facts.seed, agent))
         self._store = CheckpointStore(folder, facts.run, agent, cfg.keep_checkpoints)
-        self._inbox = bus.answer(ROLLOUT, agent=agent)
+        self._intake = Intake(
+            bus.answer(ROLLOUT, agent=agent), clock, cfg, agent, facts.fit.model or "", facts.rules
+        )
         self._schedule = bus.subscribe(SCHEDULE)
         self._reports: Outbox[VersionReport, VersionReceipt] = Outbox(
             bus, VERSION, clock, window=1, timeout=REPORT_TIMEOUT
@@ -112,21 +100,13 @@ class Learner:
             bus, INCIDENT, clock, window=64, timeout=REPORT_TIMEOUT
         )
         self._incident_sequence = 0
-        self._stage: Stage | None = None
-        self._leases: dict[str, LeaseSummary] = {}
-        self._applied = Applied()
         self._total_samples = 0
         self._announced = False
-        self._gathered: list[Held] = []
-        self._committing: list[Held] = []
-        self._first_refused_at: dict[str, float] = {}
         self._waiting_since = clock.now()
         self._samples = Rate(clock, 20.0)
         self._last_metrics: UpdateMetrics | None = None
         self._last_error = ""
-        self._counters: Counter[str] = Counter(
-            rollouts_accepted=0, rollouts_dropped=0, rollouts_repeated=0, updates=0
-        )
+        self._updates = 0
         self._meta = self._begin(version)
         self._snapshot = self._make_snapshot()
         self._report()
@@ -139,8 +119,7 @@ class Learner:
     @property
     def quiet(self) -> bool:
         """Return whether nothing is under way between this learner and anybody."""
-        waiting = self._gathered or self._committing
-        return self._announced and not waiting and not self._reports.unacknowledged
+        return self._announced and self._intake.is_empty and not self._reports.unacknowledged
 
     def _begin(self, version: int | None) -> Meta:
         """Return the checkpoint to continue from, made now when there is none."""
@@ -160,7 +139,7 @@ class Learner:
                 "checkpoint_corrupt", f"{fault}; continued from version {meta.policy_version}"
             )
         self._optimiser.restore(tensors)
-        self._applied = Applied.from_json(meta.applied)
+        self._intake.applied = Applied.from_json(meta.applied)
         self._total_samples = meta.total_samples
         self._last_metrics = meta.metrics
         log.info("checkpoint_restored", version=meta.policy_version)
@@ -173,8 +152,9 @@ class Learner:
         did = self._take_schedule()
         did |= self._take_receipt()
         self._incidents.pump()
-        did |= self._take_rollouts()
-        if self._announced and not self._committing and self._enough():
+        entering = self._meta.rollouts if self._reports.unacknowledged else ()
+        did |= self._intake.take(self.version, entering)
+        if self._announced and self._intake.samples >= self._intake.needed(self.version):
             self._update()
             did = True
         return did
@@ -183,14 +163,8 @@ class Learner:
         did = False
         while (schedule := self._schedule.take()) is not None:
             did = True
-            self._stage = schedule.stage
-            self._leases = {lease.lease: lease for lease in schedule.leases}
-            if self._gathered and not self._in_turn():
-                self._release("the stage is over")
+            self._intake.follow(schedule)
         return did
-
-    def _in_turn(self) -> bool:
-        return self._stage is not None and self._stage.agent == self._agent
 
     def _take_receipt(self) -> bool:
         """Take the league's answer to the version report: then, and only then, answer rollouts."""
@@ -202,12 +176,10 @@ class Learner:
                 continue
             # First the policy, then the room to play on: or the next rollout is a version behind.
             self._announce()
-            for request, _ in self._committing:
-                request.reply(Receipt(accepted=True))
-            self._committing = []
-            if self._stage is not None and receipt.stage != self._stage.index:
-                self._stage = None
-                self._release("the stage is over")
+            self._intake.commit()
+            stage = self._intake.stage
+            if stage is not None and receipt.stage != stage.index:
+                self._intake.end_stage()
         for _, reason in self._reports.take_refused():
             raise RiposteError(f"the league refused version {self.version}: {reason}")
         return did
@@ -226,93 +198,13 @@ class Learner:
         self._snapshot = self._make_snapshot()
         self._report()
 
-    def _take_rollouts(self) -> bool:
-        did = False
-        while (request := self._inbox.take()) is not None:
-            did = True
-            self._consider(request)
-        return did
-
-    def _consider(self, request: Request[Rollout, Receipt]) -> None:
-        """Hold a rollout, drop it, or let its actor ask again."""
-        rollout = request.message
-        if self._applied.contains(rollout.boot, rollout.sequence):
-            self._repeated(request)
-            return
-        for held in (self._gathered, self._committing):
-            for index, (_, other) in enumerate(held):
-                if other.name == rollout.name:
-                    held[index] = (request, other)
-                    self._counters["rollouts_repeated"] += 1
-                    return
-        ruling = self._rule(rollout)
-        if ruling.decision is Decision.LEARN:
-            self._first_refused_at.pop(rollout.lease, None)
-            self._gathered.append((request, rollout))
-        elif ruling.decision is Decision.LATER and not self._too_late(rollout.lease):
-            request.refuse(ruling.reason, retry=True)
-        else:
-            self._counters["rollouts_dropped"] += 1
-            self._last_error = f"dropped rollout {rollout.name}: {ruling.reason}"
-            log.info("rollout_dropped", name=rollout.name, reason=ruling.reason)
-            request.reply(Receipt(accepted=False, reason=ruling.reason))
-
-    def _repeated(self, request: Request[Rollout, Receipt]) -> None:
-        """Answer a rollout that has been learned from, once its version is in the ledger."""
-        self._counters["rollouts_repeated"] += 1
-        is_entered = not self._reports.unacknowledged
-        if is_entered or request.message.name not in self._meta.rollouts:
-            request.reply(Receipt(accepted=True))
-        else:
-            request.refuse("its version is being entered in the ledger", retry=True)
-
-    def _rule(self, rollout: Rollout) -> Ruling:
-        limit = HELD_BATCHES * max(self._cfg.batch_samples, self._cfg.warm_up_samples)
-        if sum(held.rewards.size for _, held in self._gathered) >= limit:
-            return Ruling(Decision.LATER, "enough rollouts are held here")
-        model = self._facts.fit.model or ""
-        ruling = check_provenance(rollout, self._agent, self._stage, self._leases, model)
-        if ruling.decision is Decision.LEARN:
-            ruling = check_version(rollout, self.version, self._oldest())
-        if ruling.decision is Decision.LEARN:
-            ruling = check_contents(rollout, self._facts.rules.bout_steps)
-        return ruling
-
-    def _oldest(self) -> int:
-        """Return the oldest version accepted; version 0 acted without a normaliser."""
-        if self.version == 0:
-            return 0
-        floor = 1 if self._cfg.warm_up_samples else 0
-        return max(floor, self.version - self._cfg.max_lag)
-
-    def _too_late(self, lease: str) -> bool:
-        now = self._clock.now()
-        if len(self._first_refused_at) > 1024:
-            self._first_refused_at.clear()
-        return now - self._first_refused_at.setdefault(lease, now) > UNKNOWN_LEASE_SECONDS
-
-    def _release(self, reason: str) -> None:
-        """Answer the rollouts that will not be learned from."""
-        for request, _ in self._gathered:
-            self._counters["rollouts_dropped"] += 1
-            request.reply(Receipt(accepted=False, reason=reason))
-        self._gathered = []
-
     # -- updating ---------------------------------------------------------------------------
-
-    def _enough(self) -> bool:
-        needed = self._cfg.batch_samples
-        if self.version == 0 and self._cfg.warm_up_samples:
-            needed = self._cfg.warm_up_samples
-        return sum(rollout.rewards.size for _, rollout in self._gathered) >= needed
 
     def _update(self) -> None:
         """Learn from what was gathered, write the checkpoint, report the version."""
-        self._drop_stale()
-        if not self._enough():
+        rollouts = self._intake.begin(self.version)
+        if not rollouts:
             return
-        self._committing, self._gathered = self._gathered, []
-        rollouts = [rollout for _, rollout in self._committing]
         began_at = self._clock.now()
         waited = self._clock.now() - self._waiting_since
         metrics = None
@@ -324,29 +216,14 @@ class Learner:
             self._total_samples += stats.samples
             seconds = self._clock.now() - began_at
             metrics = self._metrics(stats, lag, waited, seconds)
-        self._counters["updates"] += 1
-        self._counters["rollouts_accepted"] += len(rollouts)
+        self._updates += 1
         self._samples.add(sum(r.rewards.size for r in rollouts))
-        for rollout in rollouts:
-            self._applied.add(rollout.boot, rollout.sequence)
         names = tuple(rollout.name for rollout in rollouts)
         self._meta = self._meta_of(self.version + 1, rollouts[0].stage, names, metrics)
         self._last_metrics = metrics
         self._store.save(self._meta, self._optimiser.state())
         self._snapshot = self._make_snapshot()
         self._report()
-
-    def _drop_stale(self) -> None:
-        """Drop gathered rollouts that have become too old meanwhile."""
-        fresh: list[Held] = []
-        for request, rollout in self._gathered:
-            ruling = check_version(rollout, self.version, self._oldest())
-            if ruling.decision is Decision.LEARN:
-                fresh.append((request, rollout))
-            else:
-                self._counters["rollouts_dropped"] += 1
-                request.reply(Receipt(accepted=False, reason=ruling.reason))
-        self._gathered = fresh
 
     def _metrics(
         self, stats: UpdateStats, lag: float, waited: float, seconds: float
@@ -378,7 +255,7 @@ class Learner:
             policy_version=version,
             stage=stage,
             total_samples=self._total_samples,
-            applied=self._applied.to_json(),
+            applied=self._intake.applied.to_json(),
             rollouts=rollouts,
             metrics=metrics,
         )
@@ -460,9 +337,9 @@ class Learner:
         if not self._announced:
             reason = self._reports.last_failure or "to enter the version"
             waiting, state = f"league: {reason}", f"version {self.version} made"
-        elif self._in_turn():
-            gathered = sum(rollout.rewards.size for _, rollout in self._gathered)
-            state = f"version {self.version}: {gathered} of {self._cfg.batch_samples} samples"
+        elif self._intake.in_turn:
+            gathered = f"{self._intake.samples} of {self._cfg.batch_samples} samples"
+            state = f"version {self.version}: {gathered}"
             waiting = "actors: rollouts"
         else:
             state = f"version {self.version}, not in turn"
@@ -475,8 +352,8 @@ class Learner:
             waiting_for=waiting,
             waiting_seconds=self._clock.now() - self._waiting_since if waiting else 0.0,
             rates=rates,
-            counters=dict(self._counters),
-            last_error=self._last_error,
+            counters={**self._intake.counters, "updates": self._updates},
+            last_error=self._intake.last_error or self._last_error,
         )
 
     def close(self) -> None:
