@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks.harness import cpu_of, interleaved, median
-from services.actor.collector import Collector, Segment
+from benchmarks.rollouts import rollout_of
+from services.actor.collector import Collector
 from services.jobs.bench import Check, Measurement
 from shared.game.bout import Judgement
 from shared.game.reward import RewardConfig
 from shared.game.rules import RuleBook
-from shared.messages.training import ACTION_DIM, OBS_DIM, Rollout
+from shared.messages.training import ACTION_DIM, OBS_DIM
 from shared.messages.wire import encode
 from shared.policy.action import ActionConfig
 from shared.policy.mlp import GaussianPolicy, PolicyWeights
@@ -82,7 +83,7 @@ class Loop:
         """Play a rollout as an actor does, up to its bytes."""
         self.at = 0
         self.segment = self.collector.collect(self.policy, self.keep_command)
-        self.payload = encode(self.message(self.segment))
+        self.payload = encode(rollout_of(self.segment, self.policy, self.model.hash))
 
     def step_alone(self) -> None:
         """Step the worlds through the same commands."""
@@ -90,17 +91,6 @@ class Loop:
         for command in self.commands:
             batch.ctrl[:] = command
             batch.step()
-
-    def message(self, segment: Segment) -> Rollout:
-        """Return the rollout an actor sends."""
-        return Rollout(
-            agent="antagonist", actor="actor-0", boot="b" * 16, sequence=0, lease="lease", stage=0,
-            policy_version=1, snapshot="a" * 64, opponent="sha256:" + "b" * 64,
-            model=self.model.hash, seed=0, bouts=segment.bouts, first_step=segment.first_step,
-            obs=segment.obs, last_obs=segment.last_obs, actions=segment.actions,
-            means=segment.means, stds=self.policy.std, log_probs=segment.log_probs,
-            rewards=segment.rewards, truncated=segment.truncated,
-        )  # fmt: skip
 
     def round(self) -> dict[str, Any]:
         """Return the CPU microseconds a world step of the loop and of the physics alone."""

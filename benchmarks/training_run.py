@@ -20,7 +20,7 @@ from shared.bus.ports import free_port
 from shared.clock import SystemClock
 from shared.errors import LedgerError, RiposteError
 
-POLL_SECONDS = 0.05
+POLL_SECONDS = 0.02
 START_SECONDS = 180.0
 """Longest wait for the first version on a busy machine."""
 ENDLESS = ("league.antagonist_updates=1000000", "league.convergence_min_updates=0")
@@ -42,31 +42,19 @@ class Moment:
     """For which threads of theirs were ready to run and had no core."""
 
 
-class TrainingRun:
-    """The processes of one run; tick them by asking for something."""
+class RunReader:
+    """What the folder of a run says of it."""
 
-    def __init__(self, specs: list[ProcessSpec], folder: Path) -> None:
+    def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.began_at = time.monotonic()
-        self._supervisor = Supervisor(specs, folder / "logs", SystemClock())
-        self._supervisor.start()
 
-    def wait_for_version(self, number: int, deadline: float) -> Moment:
-        """Return the moment at which the antagonist's version was in the ledger.
+    def newest_checkpoint(self) -> int:
+        """Return the antagonist's newest version on disk; -1 before there is one.
 
-        Raises:
-            RiposteError: a process died, or it took longer than the deadline (s).
+        Cheap, so that whoever waits does not slow down what it measures.
         """
-        end = time.monotonic() + deadline
-        while time.monotonic() < end:
-            for event in self._supervisor.poll():
-                if event.kind != "finished":
-                    raise RiposteError(f"{event.describe}\n{event.tail}")
-            newest = self.newest_version()
-            if newest is not None and newest.version >= number:
-                return Moment(newest, time.monotonic(), self.cpu_seconds(), self.delay_seconds())
-            time.sleep(POLL_SECONDS)
-        raise RiposteError(f"no version {number} within {deadline:g} s: see {self.folder / 'logs'}")
+        names = (self.folder / "learner" / "antagonist").glob("checkpoint-*.safetensors")
+        return max((int(path.stem.removeprefix("checkpoint-")) for path in names), default=-1)
 
     def newest_version(self) -> VersionRecord | None:
         """Return the antagonist's newest version in the ledger; None before there is one."""
@@ -77,6 +65,37 @@ class TrainingRun:
                 return RunState.fold(ledger.replay()).latest("antagonist")
         except LedgerError:  # being made
             return None
+
+
+class TrainingRun(RunReader):
+    """The processes of one run; tick them by asking for something."""
+
+    def __init__(self, specs: list[ProcessSpec], folder: Path) -> None:
+        super().__init__(folder)
+        self._supervisor = Supervisor(specs, folder / "logs", SystemClock())
+        self._supervisor.start()
+
+    def wait_for_version(self, number: int, deadline: float = START_SECONDS) -> Moment:
+        """Return the moment at which the antagonist's version was in the ledger.
+
+        Raises:
+            RiposteError: a process died, or it took longer than the deadline (s).
+        """
+        end = time.monotonic() + deadline
+        while time.monotonic() < end:
+            self._check_processes()
+            if self.newest_checkpoint() >= number:
+                at, cpu, delay = time.monotonic(), self.cpu_seconds(), self.delay_seconds()
+                newest = self.newest_version()
+                if newest is not None and newest.version >= number:
+                    return Moment(newest, at, cpu, delay)
+            time.sleep(POLL_SECONDS)
+        raise RiposteError(f"no version {number} within {deadline:g} s: see {self.folder / 'logs'}")
+
+    def _check_processes(self) -> None:
+        for event in self._supervisor.poll():
+            if event.kind != "finished":
+                raise RiposteError(f"{event.describe}\n{event.tail}")
 
     def cpu_seconds(self) -> dict[str, float]:
         """Return the CPU seconds each process has used."""
@@ -103,10 +122,11 @@ class TrainingRun:
 
     def window(self, seconds: float) -> dict[str, Any]:
         """Return samples and CPU seconds of a stretch between two versions, warm."""
-        begin = self.wait_for_version(WARM_VERSION, START_SECONDS)
-        end = self.wait_for_version(begin.version.version + 1, START_SECONDS)
-        while end.at - begin.at < seconds:
-            end = self.wait_for_version(end.version.version + 1, START_SECONDS)
+        begin = self.wait_for_version(WARM_VERSION)
+        while time.monotonic() < begin.at + seconds:
+            self._check_processes()
+            time.sleep(0.5)
+        end = self.wait_for_version(self.newest_checkpoint() + 1)
         assert begin.version.metrics is not None
         assert end.version.metrics is not None
         samples = end.version.metrics.total_samples - begin.version.metrics.total_samples

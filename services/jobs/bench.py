@@ -12,7 +12,7 @@ import os
 import platform
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Literal, Protocol, cast
@@ -27,6 +27,16 @@ from shared.runtime.process import THREAD_LIMITS
 QUIET_LOAD = 0.5
 """Load average per core above which a row says that the machine was busy."""
 RESULTS = "RESULTS.md"
+TABLE_HEAD = """# Measured
+
+A row is what one command printed on one machine; `riposte bench NAME --write` and
+`python -m benchmarks.learning ... --write` add rows. Both sides of a ratio were measured in the
+same run, in turns. In brackets: smallest to largest over the rounds, or, as [low, high], a 95 %
+interval over seeds. A load beside the number of cores says whether the machine was quiet.
+
+| Date | Benchmark | Figure of the goal | Against the limit | Also | Machine | Command | Commit |
+|---|---|---|---|---|---|---|---|
+"""
 PACKAGES = ("mujoco", "numpy", "torch", "rsl-rl-lib", "eclipse-zenoh")
 """Whose versions stand in a row."""
 
@@ -40,6 +50,9 @@ class Check(msgspec.Struct, frozen=True, kw_only=True):
     goal: float | None = None
     """None: only shown."""
     goal_is: Literal["at least", "at most"] = "at least"
+    low: float | None = None
+    """95 % interval of the value, where it is the mean of several seeds."""
+    high: float | None = None
 
     @property
     def is_met(self) -> bool:
@@ -158,10 +171,24 @@ def run(name: str, *, smoke: bool) -> dict[str, Any]:
     """
     os.environ.update(THREAD_LIMITS)  # before a library that reads it is loaded
     sys.path.insert(0, str(SOURCE_ROOT))
+
+    def measure() -> Measurement:
+        return cast("Script", importlib.import_module(f"benchmarks.{name}")).measure(smoke)
+
+    return report_of(name, measure, smoke=smoke)
+
+
+def report_of(name: str, measure: Callable[[], Measurement], *, smoke: bool) -> dict[str, Any]:
+    """Measure, and return the object that ``--json`` prints.
+
+    Args:
+        name: of what is measured.
+        measure: does it.
+        smoke: the figures mean nothing.
+    """
     load_before = os.getloadavg()
     cpu_before, began_at = _cpu_seconds(), time.perf_counter()
-    script = cast("Script", importlib.import_module(f"benchmarks.{name}"))
-    found = script.measure(smoke)
+    found = measure()
     machine = describe_machine(load_before)
     return {
         "name": name,
@@ -229,8 +256,7 @@ def text_of(report: dict[str, Any]) -> str:
     for check in (report["goal"], *report["checks"]):
         mark = " " if check["goal"] is None else "✓" if check["met"] else "✗"
         wanted = "" if check["goal"] is None else f" (goal: {check['goal_is']} {check['goal']:g})"
-        unit = f" {check['unit']}" if check["unit"] else ""
-        lines.append(f"  {mark} {check['name']:<52} {figure(check['value'])}{unit}{wanted}")
+        lines.append(f"  {mark} {check['name']:<52} {_value(check)}{wanted}")
     quiet = "quiet" if machine["quiet"] else "BUSY: measure again"
     lines.append(
         f"  {len(report['runs'])} rounds, {report['wall_s']:.0f} s, {report['cpu_s']:.0f} CPU s, "
@@ -247,8 +273,16 @@ def figure(value: float) -> str:
     return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
 
 
+def _value(check: dict[str, Any]) -> str:
+    """Return a check's value with its interval and unit."""
+    unit = f" {check['unit']}" if check["unit"] else ""
+    if check["low"] is None:
+        return f"{figure(check['value'])}{unit}"
+    return f"{figure(check['value'])} [{figure(check['low'])}, {figure(check['high'])}]{unit}"
+
+
 def add_row(path: Path, report: dict[str, Any], command: str) -> None:
-    """Add what was measured to the table of results.
+    """Add what was measured to the table of results; begin the table where there is none.
 
     Args:
         path: the table.
@@ -258,17 +292,13 @@ def add_row(path: Path, report: dict[str, Any], command: str) -> None:
     machine = report["machine"]
     ratios = [run["ratio"] for run in report["runs"] if "ratio" in run]
     spread = f" ({min(ratios):.3g} to {max(ratios):.3g}, n = {len(ratios)})" if ratios else ""
-    checks = "; ".join(
-        f"{check['name']} {figure(check['value'])}{' ' + check['unit'] if check['unit'] else ''}"
-        for check in report["checks"]
-    )
+    checks = "; ".join(f"{check['name']} {_value(check)}" for check in report["checks"])
     versions = ", ".join(f"{name} {number}" for name, number in machine["versions"].items())
     goal = report["goal"]
     cells = (
         datetime.datetime.now(datetime.UTC).date().isoformat(),
         report["name"],
-        f"**{figure(goal['value'])}**{spread}, {goal['name']}; goal {goal['goal_is']} "
-        f"{goal['goal']:g}",
+        f"**{_value(goal)}**{spread}, {goal['name']}; goal {goal['goal_is']} {goal['goal']:g}",
         f"{figure(report['value'])} against {figure(report['limit'])} {report['unit']}",
         checks,
         f"load {machine['load_before'][0]:.2f} to {machine['load_after'][0]:.2f}; "
@@ -276,5 +306,8 @@ def add_row(path: Path, report: dict[str, Any], command: str) -> None:
         f"`{command}`",
         report["commit"],
     )
+    is_new = not path.exists()
     with path.open("a", encoding="utf-8") as file:
+        if is_new:
+            file.write(TABLE_HEAD)
         file.write("| " + " | ".join(cell.replace("|", "/") for cell in cells) + " |\n")
