@@ -47,6 +47,11 @@ class LeaseKeeper:
         """Return whether no answer is awaited."""
         return self._requested is None and self._renewing is None
 
+    @property
+    def is_free(self) -> bool:
+        """Return whether there is neither work nor a request for it."""
+        return self.lease is None and self._requested is None
+
     def tick(self) -> bool:
         """Ask, renew or take an answer; return whether anything was done."""
         did = self._follow_schedule()

@@ -103,7 +103,8 @@ class Actor:
         self._result_sequence = 0
         self._resume: tuple[Arrays, dict[str, Any]] | None = None
         self.paused = False
-        """Keep up with everybody, but play nothing (serial mode, around a cut)."""
+        """Keep up with everybody, but play nothing and take on nothing (serial mode, around a
+        cut)."""
         self._samples = Rate(clock)
         self._waiting = ""
         self._waiting_since = clock.now()
@@ -127,7 +128,8 @@ class Actor:
         """Do one piece of work: at most one rollout, or as many steps of an evaluation."""
         did = self._pump()
         did |= self._take_policies()
-        did |= self._keeper.tick()
+        if not (self.paused and self._keeper.is_free):
+            did |= self._keeper.tick()
         lease = self._keeper.lease
         if lease is None or lease.lease != self._playing:
             self._forget()
@@ -135,6 +137,8 @@ class Actor:
             self._wait_for(self._keeper.waiting_for or "league: a lease")
             return did
         if self._collector is None and self._evaluation is None:
+            if self.paused and lease.stage is None:
+                return did
             return self._start(lease) or did
         return (not self.paused and self._play(lease)) or did
 
@@ -285,7 +289,6 @@ class Actor:
         self._count_steps(self._cfg.rollout_steps)
         outbox.put(self._rollout(lease, stage, learning, segment))
         self._rollout_sequence += 1
-        outbox.pump()
         own = f"sha256:{learning.digest}"
         pair = (own, stage.opponent) if stage.agent == "antagonist" else (stage.opponent, own)
         self._show(lease, int(segment.bouts[WORLD]), pair)
@@ -338,7 +341,6 @@ class Actor:
         self._result_sequence += 1
         self._counters["bouts"] += len(results.bouts)
         self._results.put(message)
-        self._results.pump()
 
     def _show(self, lease: Lease, bout: int, players: tuple[str, str]) -> None:
         frames = self._frames.take(self._bus.name, lease.lease, bout, players)
@@ -370,8 +372,9 @@ class Actor:
 
     @property
     def ready(self) -> bool:
-        """Return whether it holds all it needs to play its lease, or has none."""
-        return self._keeper.lease is None or self._collector is not None
+        """Return whether its training lease can be played on, if it has one."""
+        lease = self._keeper.lease
+        return lease is None or lease.stage is None or self._collector is not None
 
     def state(self) -> tuple[Arrays, dict[str, Any]]:
         """Return arrays and JSON values from which ``restore`` continues; only when ``quiet``."""

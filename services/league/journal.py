@@ -131,6 +131,9 @@ class Journal:
 
 
 def _check_same_run(path: Path, state: RunState, start: RunStarted) -> None:
+    if state.serial != start.serial:
+        how, flag = ("in one process", "with") if state.serial else ("by processes", "without")
+        raise LedgerError(f"ledger {path} was begun {how}; resume it {flag} --serial")
     if state.run != start.run:
         raise LedgerError(
             f"ledger {path} is of run {state.run!r}, not {start.run!r}; "

@@ -163,7 +163,10 @@ class Learner:
         did = False
         while (schedule := self._schedule.take()) is not None:
             did = True
+            was_in_turn = self._intake.in_turn
             self._intake.follow(schedule)
+            if self._intake.in_turn and not was_in_turn:
+                self._waiting_since = self._clock.now()
         return did
 
     def _take_receipt(self) -> bool:
@@ -296,7 +299,6 @@ class Learner:
                 metrics=self._meta.metrics,
             )
         )
-        self._reports.pump()
 
     def _announce(self) -> None:
         self._announced = True

@@ -76,7 +76,7 @@ class Outbox(Generic[In, Out]):
         return self._clock.now() - self._entries[0].put_at if self._entries else 0.0
 
     def put(self, message: In) -> None:
-        """Take charge of a message; ``pump`` sends it.
+        """Take charge of a message and send it; the answer comes out of ``pump``.
 
         Raises:
             ValueError: if the outbox is full; look at ``full`` first.
@@ -85,7 +85,9 @@ class Outbox(Generic[In, Out]):
             raise ValueError(
                 f"outbox of {self._service.key} is full ({self.unacknowledged} of {self.window})"
             )
-        self._entries.append(_Entry(message, self._clock.now()))
+        entry: _Entry[In, Out] = _Entry(message, self._clock.now())
+        self._ask(entry)
+        self._entries.append(entry)
 
     def pump(self) -> list[tuple[In, Out]]:
         """Ask what is due and return the messages answered since the last call, with the answer.
@@ -98,9 +100,7 @@ class Outbox(Generic[In, Out]):
         now = self._clock.now()
         for entry in self._entries:
             if entry.pending is None and now >= entry.ask_at:
-                entry.pending = self._bus.ask(
-                    self._service, entry.message, self._timeout, **self._fields
-                )
+                self._ask(entry)
             answer = entry.pending.take() if entry.pending else None
             if answer is None:
                 left.append(entry)
@@ -117,6 +117,9 @@ class Outbox(Generic[In, Out]):
                 answered.append((entry.message, answer))
         self._entries = left
         return answered
+
+    def _ask(self, entry: _Entry[In, Out]) -> None:
+        entry.pending = self._bus.ask(self._service, entry.message, self._timeout, **self._fields)
 
     def take_refused(self) -> list[tuple[In, str]]:
         """Return the messages refused for good since the last call, each with the reason."""

@@ -45,6 +45,21 @@ def test_an_outbox_gives_back_each_message_with_its_answer() -> None:
     assert site.outbox.unacknowledged == 0
 
 
+def test_a_message_is_sent_when_it_is_put_and_an_answer_that_is_there_already_is_not_lost() -> None:
+    clock = ManualClock()
+    hub = MemoryHub(clock)
+    league, actor = hub.join("league"), hub.join("actor")
+    inbox = league.answer(INCIDENT)
+    outbox: Outbox[Incident, Receipt] = Outbox(actor, INCIDENT, clock, window=1, timeout=5.0)
+    outbox.put(an_incident(0))
+    request = inbox.take()
+    assert request is not None
+    request.reply(Receipt(accepted=True))
+    assert outbox.unacknowledged == 1
+    assert outbox.pump() == [(an_incident(0), Receipt(accepted=True))]
+    assert outbox.unacknowledged == 0
+
+
 def test_a_full_outbox_takes_nothing_more_until_its_window_grows() -> None:
     site = Site(window=2)
     site.outbox.put(an_incident(0))
