@@ -16,6 +16,7 @@ from benchmarks.harness import cpu_of, interleaved, median
 from benchmarks.rollouts import rollout_of
 from services.actor.collector import Collector
 from services.jobs.bench import Check, Measurement
+from services.league.config import LeagueConfig
 from shared.game.bout import Judgement
 from shared.game.reward import RewardConfig
 from shared.game.rules import RuleBook
@@ -65,9 +66,9 @@ class Loop:
         self.model = FencingModel.build(SimConfig())
         self.env = FencingEnv(self.model, RuleBook(), ActionConfig(), num_envs)
         self.policy = a_policy(generator)
-        opponent = SnapshotPlayer(a_policy(generator), stochastic=False)
+        opponent = SnapshotPlayer(a_policy(generator), LeagueConfig().opponent_stochastic)
         self.collector = Collector(
-            self.env, 0, opponent, ROLLOUT_STEPS, 1.0, 1.0, RewardConfig(), seed=0
+            self.env, 0, opponent, ROLLOUT_STEPS, 1.0, 0.1, RewardConfig(), seed=0
         )
         self.rollouts = rollouts
         self.commands = np.empty((ROLLOUT_STEPS, *self.env.batch.ctrl.shape))
