@@ -11,17 +11,17 @@ from services.actor.config import ActorConfig
 from services.actor.frames import WORLD, FrameSampler
 from services.actor.leasing import LeaseKeeper
 from services.actor.opponents import Opponents
+from services.actor.policies import LearningPolicies, LearningPolicy
 from shared.bus.base import Bus
 from shared.bus.delivery import Outbox
 from shared.clock import Clock
 from shared.errors import SnapshotError
 from shared.game.reward import RewardConfig
 from shared.messages.league import BoutResults, Lease, Stage
-from shared.messages.topics import FRAMES, POLICY, RESULTS, ROLLOUT
-from shared.messages.training import AGENTS, Agent, PolicyAnnouncement, Receipt, Rollout
-from shared.policy.mlp import GaussianPolicy
+from shared.messages.topics import FRAMES, RESULTS, ROLLOUT
+from shared.messages.training import AGENTS, Agent, Receipt, Rollout
 from shared.policy.players import Player
-from shared.policy.snapshot import Fit, unpack
+from shared.policy.snapshot import Fit
 from shared.runtime.rate import Rate
 from shared.runtime.service import Health
 from shared.sim.env import FencingEnv
@@ -34,15 +34,6 @@ UNPLAYABLE_SECONDS = 1.0
 """Before the next request for work when a lease could not be played."""
 RESULTS_WINDOW = 256
 """Result messages that may wait for the league."""
-
-
-@dataclasses.dataclass
-class LearningPolicy:
-    """The newest announced policy of the learning side."""
-
-    policy: GaussianPolicy
-    version: int
-    digest: str
 
 
 class Actor:
@@ -78,7 +69,6 @@ class Actor:
         self._cfg = cfg
         self._reward_cfg = reward_cfg
         self._env = env
-        self._fit = fit
         self._bus = bus
         self._clock = clock
         self._opponents = Opponents(bus, clock, fit, cfg.opponent_cache, cfg.ask_timeout)
@@ -91,8 +81,7 @@ class Actor:
         self._results: Outbox[BoutResults, Receipt] = Outbox(
             bus, RESULTS, clock, window=RESULTS_WINDOW, timeout=cfg.ask_timeout
         )
-        self._policies = {agent: bus.subscribe(POLICY, agent=agent) for agent in AGENTS}
-        self._learning: dict[Agent, LearningPolicy] = {}
+        self._policies = LearningPolicies(bus, fit)
         self._frames = FrameSampler(env, clock, cfg.frame_period, cfg.frame_steps)
         self._keeper = LeaseKeeper(bus, clock, cfg.num_envs, cfg.ask_timeout)
         self._playing = ""
@@ -127,7 +116,7 @@ class Actor:
     def tick(self) -> bool:
         """Do one piece of work: at most one rollout, or as many steps of an evaluation."""
         did = self._pump()
-        did |= self._take_policies()
+        did |= self._policies.tick()
         if not (self.paused and self._keeper.is_free):
             did |= self._keeper.tick()
         lease = self._keeper.lease
@@ -171,27 +160,6 @@ class Actor:
             self._last_error = f"rollout {name} dropped: {reason}"
             log.info("rollout_dropped", name=name, reason=reason)
 
-    def _take_policies(self) -> bool:
-        """Take the newest announced policies; one that does not fit is said and not used."""
-        did = False
-        for subscription in self._policies.values():
-            while (announcement := subscription.take()) is not None:
-                did = True
-                self._learn_of(announcement)
-        return did
-
-    def _learn_of(self, announcement: PolicyAnnouncement) -> None:
-        try:
-            snapshot = unpack(announcement.payload.tobytes(), announcement.snapshot)
-            snapshot.check_fits(self._fit)
-        except SnapshotError as error:
-            self._last_error = str(error)
-            log.error("policy_refused", agent=announcement.agent, reason=str(error))
-            return
-        self._learning[announcement.agent] = LearningPolicy(
-            GaussianPolicy(snapshot.weights), announcement.policy_version, snapshot.digest
-        )
-
     # -- the lease --------------------------------------------------------------------------
 
     def _forget(self) -> None:
@@ -222,7 +190,7 @@ class Actor:
         opponent = self._player(stage.opponent, stochastic=lease.stochastic)
         if opponent is None:
             return False
-        if stage.agent not in self._learning:
+        if self._policies.get(stage.agent) is None:
             self._wait_for(f"learner {stage.agent}: its first policy")
             return False
         self._collector = Collector(
@@ -284,7 +252,8 @@ class Actor:
                 f"learner {stage.agent}: {outbox.unacknowledged} rollouts unacknowledged"
             )
             return False
-        learning = self._learning[stage.agent]
+        learning = self._policies.get(stage.agent)
+        assert learning is not None  # the lease was not started without one
         segment = collector.collect(learning.policy, self._frames.on_step)
         self._count_steps(self._cfg.rollout_steps)
         outbox.put(self._rollout(lease, stage, learning, segment))
@@ -415,7 +384,7 @@ class Actor:
             waiting_seconds=waited,
             rates={"steps_per_s": self._samples.per_second()},
             counters={**self._counters, "opponents_cached": len(self._opponents)},
-            last_error=self._last_error,
+            last_error=self._last_error or self._policies.last_error,
         )
 
     def close(self) -> None:
