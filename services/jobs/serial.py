@@ -141,11 +141,17 @@ class SerialRun:
         """Return whether the schedule is done."""
         return self.league.state.finished
 
+    @property
+    def cut_number(self) -> int:
+        """Return how many cuts have been written."""
+        return self._number
+
     def tick(self) -> bool:
         """Tick every service once; write a cut where something was completed."""
         before = self._milestone()
         steps = self._steps()
-        did = self._tick_all()
+        # A question asked in one round is answered in the next: nobody waits for that.
+        did = self._tick_all() or self._tick_all()
         for _, reporter in self._services:
             reporter.tick()
         played = self._steps() - steps

@@ -1,0 +1,98 @@
+"""Small serial runs, and everything they leave behind."""
+
+import contextlib
+import sqlite3
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from services.jobs.serial import SerialRun
+from services.jobs.settings import Settings
+
+SMALL = (
+    "actor.num_envs=8",
+    "actor.rollout_steps=20",
+    "game.bout_steps=80",
+    "learner.batch_samples=640",
+    "learner.warm_up_samples=640",
+    "learner.hidden_dims=[16,16]",
+    "learner.minibatches=4",
+    "league.antagonist_updates=3",
+    "league.protagonist_updates=3",
+    "league.iterations=1",
+    "league.evaluation_bouts=8",
+    "league.convergence_min_updates=0",
+    "train.record=false",
+)
+"""A whole run in about a second: two stages of three updates, 16 evaluation bouts."""
+
+RUN = "serial-run"
+
+
+@dataclass(frozen=True)
+class Remains:
+    """What a run leaves, byte for byte."""
+
+    snapshots: dict[str, bytes]
+    ledger: list[tuple[object, ...]]
+    """Rows, times included."""
+    checkpoints: dict[str, bytes]
+    """Weights, optimiser, normaliser and random state of each learner."""
+    cuts: dict[str, bytes]
+    """Physics, scoreboards and random state of the actor."""
+
+
+def run(
+    folder: Path,
+    *,
+    resume: bool = False,
+    ticks: int | None = None,
+    record: bool = False,
+    overrides: tuple[str, ...] = (),
+    look: Callable[[SerialRun], None] | None = None,
+) -> int:
+    """Run to the end, or for so many ticks; return the number of ticks.
+
+    Whoever leaves after ``ticks`` leaves as a killed process does: nothing is finished.
+    """
+    settings = Settings.load(None, [*SMALL, *overrides])
+    done = 0
+    with contextlib.closing(
+        SerialRun(settings, folder, RUN, resume=resume, record=record)
+    ) as serial:
+        while not serial.finished and done != ticks:
+            serial.tick()
+            done += 1
+            assert done < 2000, serial.actor.health()
+        if look is not None:
+            look(serial)
+    return done
+
+
+def remains(folder: Path) -> Remains:
+    """Return what lies in the folder of a run."""
+
+    def files(pattern: str) -> dict[str, bytes]:
+        paths = sorted(folder.glob(pattern))
+        return {str(path.relative_to(folder)): path.read_bytes() for path in paths}
+
+    with contextlib.closing(sqlite3.connect(folder / "league.sqlite")) as connection:
+        rows = connection.execute("SELECT seq, kind, key, body, at_ns FROM events ORDER BY seq")
+        ledger = rows.fetchall()
+    return Remains(
+        snapshots=files("snapshots/*.safetensors"),
+        ledger=ledger,
+        checkpoints=files("learner/*/*.safetensors"),
+        cuts=files("serial/*.safetensors"),
+    )
+
+
+def assert_same(found: Remains, wanted: Remains) -> None:
+    """Fail with the first difference, not with a page of bytes."""
+    for own, other in zip(found.ledger, wanted.ledger, strict=False):
+        assert own == other, f"{own} is not\n{other}"
+    assert len(found.ledger) == len(wanted.ledger)
+    for kind in ("snapshots", "checkpoints", "cuts"):
+        own, other = getattr(found, kind), getattr(wanted, kind)
+        assert list(own) == list(other)
+        assert [name for name in own if own[name] != other[name]] == []
