@@ -39,7 +39,7 @@ class TrainConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 BUDGETS: dict[str, tuple[str, ...]] = {
     "quick": (
-        "league.antagonist_updates=50",
+        "league.antagonist_updates=60",
         "league.protagonist_updates=80",
         "league.evaluation_bouts=64",
     ),

@@ -10,7 +10,7 @@ class LeagueConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """Seed of the run; every lease's seed follows from it."""
     iterations: int = 2
     """Iterations of phase one; in each the antagonist learns first, then the protagonist."""
-    antagonist_updates: int = 60
+    antagonist_updates: int = 100
     """Most PPO updates of the antagonist in one stage."""
     protagonist_updates: int = 160
     """Most PPO updates of the protagonist in one stage."""

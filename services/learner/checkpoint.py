@@ -35,6 +35,8 @@ class Meta(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     policy_version: int
     stage: int
     """In which this version was made; -1 for version 0."""
+    stage_updates: int = 0
+    """Updates of this agent in that stage, this one included."""
     total_samples: int
     applied: str
     """Names of all rollouts learned from (``Applied.to_json``)."""

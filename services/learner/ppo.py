@@ -108,12 +108,17 @@ class PolicyOptimiser:
         self._algorithm.actor.update_normalization(obs)
         self._algorithm.critic.update_normalization(obs)
 
-    def update(self, rollouts: Sequence[Rollout]) -> UpdateStats:
+    def update(
+        self, rollouts: Sequence[Rollout], learning_rate: float | None = None
+    ) -> UpdateStats:
         """Run one PPO update on exactly these rollouts.
 
         Args:
             rollouts: checked ones; their rows are used in this order.
+            learning_rate: Adam's step; the configured one without it.
         """
+        for group in self._algorithm.optimizer.param_groups:
+            group["lr"] = learning_rate or self.cfg.learning_rate
         with torch.random.fork_rng(devices=[]):
             torch.set_rng_state(self._random_state)
             stats = self._update(rollouts)

@@ -130,7 +130,7 @@ class Learner:
         elif (found := self._store.load_newest()) is not None:
             meta, tensors, faults = found
         else:
-            meta = self._meta_of(0, -1, (), None)
+            meta = self._meta_of(0, -1, 0, (), None)
             self._store.save(meta, self._optimiser.state())
             return meta
         for fault in faults:
@@ -209,27 +209,35 @@ class Learner:
         if not rollouts:
             return
         began_at = self._clock.now()
-        waited = self._clock.now() - self._waiting_since
+        waited = began_at - self._waiting_since
+        stage = rollouts[0].stage
+        done = self._meta.stage_updates if self._meta.stage == stage else 0
         metrics = None
         if self.version == 0 and self._cfg.warm_up_samples:
             self._optimiser.warm_up(rollouts)
         else:
-            stats = self._optimiser.update(rollouts)
+            learning_rate = self._learning_rate(done)
+            stats = self._optimiser.update(rollouts, learning_rate)
             lag = float(np.mean([self.version - r.policy_version for r in rollouts]))
             self._total_samples += stats.samples
             seconds = self._clock.now() - began_at
-            metrics = self._metrics(stats, lag, waited, seconds)
+            metrics = self._metrics(stats, learning_rate, lag, waited, seconds)
         self._updates += 1
         self._samples.add(sum(r.rewards.size for r in rollouts))
         names = tuple(rollout.name for rollout in rollouts)
-        self._meta = self._meta_of(self.version + 1, rollouts[0].stage, names, metrics)
+        self._meta = self._meta_of(self.version + 1, stage, done + 1, names, metrics)
         self._last_metrics = metrics
         self._store.save(self._meta, self._optimiser.state())
         self._snapshot = self._make_snapshot()
         self._report()
 
     def _metrics(
-        self, stats: UpdateStats, lag: float, waited: float, seconds: float
+        self,
+        stats: UpdateStats,
+        learning_rate: float,
+        lag: float,
+        waited: float,
+        seconds: float,
     ) -> UpdateMetrics:
         return UpdateMetrics(
             samples=stats.samples,
@@ -242,14 +250,29 @@ class Learner:
             clip_fraction=stats.clip_fraction,
             explained_variance=stats.explained_variance,
             policy_lag_mean=lag,
-            learning_rate=self._cfg.learning_rate,
+            learning_rate=learning_rate,
             action_std=stats.action_std,
             wait_seconds=waited,
             update_seconds=seconds,
         )
 
+    def _learning_rate(self, done: int) -> float:
+        """Return Adam's step after so many updates of the stage: a line down to its budget's end.
+
+        It follows from the stage alone, so that late rollouts cannot move it.
+        """
+        stage = self._intake.stage
+        share = 0.0 if stage is None else min(done / stage.max_updates, 1.0)
+        first, last = self._cfg.learning_rate, self._cfg.final_learning_rate
+        return first + share * (last - first)
+
     def _meta_of(
-        self, version: int, stage: int, rollouts: tuple[str, ...], metrics: UpdateMetrics | None
+        self,
+        version: int,
+        stage: int,
+        stage_updates: int,
+        rollouts: tuple[str, ...],
+        metrics: UpdateMetrics | None,
     ) -> Meta:
         return Meta(
             run=self._facts.run,
@@ -257,6 +280,7 @@ class Learner:
             seed=self._facts.seed,
             policy_version=version,
             stage=stage,
+            stage_updates=stage_updates,
             total_samples=self._total_samples,
             applied=self._intake.applied.to_json(),
             rollouts=rollouts,

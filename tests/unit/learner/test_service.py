@@ -578,3 +578,21 @@ def test_health_says_what_it_waits_for(table: Table):
     assert health.state == "version 0: 0 of 64 samples"
     table.schedule(msgspec.structs.replace(STAGE, index=1, agent="protagonist"), ())
     assert table.learner.health().state == "version 0, not in turn"
+
+
+def test_the_learning_rate_falls_on_a_line_over_the_stage_and_a_restart_does_not_move_it(
+    tmp_path: Path,
+):
+    cfg = msgspec.structs.replace(SMALL, learning_rate=1e-3, final_learning_rate=4e-4)
+    table = Table(tmp_path, cfg)
+    table.warm()  # the first of the stage's three updates
+    rates: list[float] = []
+    for _ in range(2):
+        table.send()
+        metrics = table.accept().metrics
+        assert metrics is not None
+        rates.append(metrics.learning_rate)
+        table.restart()
+        table.accept()
+        table.schedule()
+    assert rates == pytest.approx([8e-4, 6e-4])
