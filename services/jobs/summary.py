@@ -248,7 +248,8 @@ def bins(points: Sequence[CurvePoint]) -> list[list[CurvePoint]]:
         found[-1].append(point)
         bouts += len(point.score)
     if len(found) > 1 and bouts < least:
-        found[-2] += found.pop()
+        few = found.pop()
+        found[-1] += few
     return found
 
 
