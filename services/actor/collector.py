@@ -12,9 +12,11 @@ from shared.game.reward import RewardConfig, reward
 from shared.messages.training import ACTION_DIM, OBS_DIM
 from shared.policy.mlp import GaussianPolicy
 from shared.policy.players import Player
-from shared.sim.env import FencingEnv
+from shared.sim.env import UNJUDGED_STEPS, FencingEnv
 
 Float32s = NDArray[np.float32]
+Verdict = Callable[[], Judgement]
+"""Gives a viewer the judgement of the step just played; made only when asked for, and once."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -112,7 +114,7 @@ class Collector:
         env.reset(self._bouts, self._generator, first)
 
     def collect(
-        self, policy: GaussianPolicy, on_step: Callable[[Judgement], None] | None = None
+        self, policy: GaussianPolicy, on_step: Callable[[Verdict], None] | None = None
     ) -> Segment:
         """Play T steps with one policy and return them; finished bouts start anew.
 
@@ -129,16 +131,32 @@ class Collector:
         noise = self._generator.standard_normal((steps, worlds, ACTION_DIM), np.float32)
         other_obs = np.empty((worlds, OBS_DIM), np.float32)
         first_step = env.scores.step.copy()
+        judged = 0
+
+        def verdict() -> Judgement:
+            """Judge what was played since the last time, with its rewards."""
+            nonlocal judged
+            judgement = env.judge()
+            count = len(judgement.points)
+            rewards[judged : judged + count] = reward(
+                side, judgement, *self._weights, self._reward_cfg
+            )
+            judged += count
+            return judgement.newest
+
         for step in range(steps):
             env.observe(*((obs[step], other_obs) if side == 0 else (other_obs, obs[step])))
             means[step] = policy.mean(obs[step])
             actions[step] = policy.sample(means[step], noise[step])
             other = self._opponent.act(other_obs, self._generator)
             pair = (actions[step], other) if side == 0 else (other, actions[step])
-            judgement = env.step(*pair)
-            rewards[step] = reward(side, judgement, *self._weights, self._reward_cfg)
+            env.advance(*pair)
             if on_step is not None:
-                on_step(judgement)
+                on_step(verdict)
+            if env.unjudged == UNJUDGED_STEPS:
+                verdict()
+        if env.unjudged:
+            verdict()
         env.batch.check()
         last_obs = np.empty_like(other_obs)
         env.observe(*((last_obs, other_obs) if side == 0 else (other_obs, last_obs)))
@@ -220,7 +238,7 @@ class Evaluation:
         env.reset(self._numbers, self._generator)
 
     def advance(
-        self, steps: int, on_step: Callable[[Judgement], None] | None = None
+        self, steps: int, on_step: Callable[[Verdict], None] | None = None
     ) -> Results | None:
         """Play up to so many steps; return the results once the bouts are over."""
         env = self._env
@@ -234,7 +252,7 @@ class Evaluation:
             judgement = env.step(*actions)
             self.left -= 1
             if on_step is not None:
-                on_step(judgement)
+                on_step(lambda judgement=judgement: judgement)
         env.batch.check()
         if self.left:
             return None

@@ -1,5 +1,7 @@
 """Samples one bout at a time for viewers: cheap, and never in the way of the rollouts."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,14 +43,19 @@ class FrameSampler:
         self._frames.clear()
         self._marks.clear()
 
-    def on_step(self, judgement: Judgement) -> None:
-        """Look at the world after a control step."""
-        step = int(self._env.scores.step[WORLD])
+    def on_step(self, verdict: Callable[[], Judgement]) -> None:
+        """Look at the world after a control step.
+
+        Args:
+            verdict: gives the step's judgement; the score is up to date from then on.
+        """
+        step = int(self._env.scores.step[WORLD]) + self._env.unjudged
         if not self._following:
             if step != 1 or self._period <= 0.0 or self._clock.now() < self._not_before:
                 return
             self._following = True
         if step % self._every == 0:
+            judgement = verdict()
             positions, quaternions = self._env.batch.body_poses(WORLD)
             joints = self._env.batch.qpos[WORLD].astype(np.float32).reshape(2, 7)
             self._frames.append((step, positions, quaternions, joints))

@@ -157,7 +157,6 @@ class Actor:
             log.info("rollout_acknowledged", name=name)
         else:
             self._counters["rollouts_dropped"] += 1
-            self._last_error = f"rollout {name} dropped: {reason}"
             log.info("rollout_dropped", name=name, reason=reason)
 
     # -- the lease --------------------------------------------------------------------------

@@ -31,13 +31,15 @@ class Ruling:
 
     decision: Decision
     reason: str = ""
+    is_fault: bool = False
+    """Somebody got something wrong; a rollout that merely came late is nobody's fault."""
 
 
 LEARN = Ruling(Decision.LEARN)
 
 
 def _drop(reason: str) -> Ruling:
-    return Ruling(Decision.DROP, reason)
+    return Ruling(Decision.DROP, reason, is_fault=True)
 
 
 def check_provenance(
@@ -64,7 +66,7 @@ def check_provenance(
     if rollout.stage > now:
         return Ruling(Decision.LATER, f"stage {rollout.stage} is not known here yet")
     if stage is None or rollout.stage < now or stage.agent != agent:
-        return _drop(f"stage {rollout.stage} is over")
+        return Ruling(Decision.DROP, f"stage {rollout.stage} is over")
     lease = leases.get(rollout.lease)
     if lease is None:
         return Ruling(Decision.LATER, f"unknown bout: lease {rollout.lease} is not in the schedule")
@@ -86,7 +88,10 @@ def check_version(rollout: Rollout, current: int, oldest: int) -> Ruling:
     if rollout.policy_version > current:
         return Ruling(Decision.LATER, f"version {rollout.policy_version} is not made here yet")
     if rollout.policy_version < oldest:
-        return _drop(f"stale: version {rollout.policy_version}, now {current}, oldest {oldest}")
+        return Ruling(
+            Decision.DROP,
+            f"stale: version {rollout.policy_version}, now {current}, oldest {oldest}",
+        )
     return LEARN
 
 

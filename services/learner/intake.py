@@ -3,7 +3,7 @@
 A held rollout is answered only when the learner says that what was made from it is durable.
 """
 
-from collections import Counter
+from collections import Counter, deque
 
 import structlog
 
@@ -23,6 +23,7 @@ UNKNOWN_LEASE_SECONDS = 10.0
 HELD_BATCHES = 4
 """Rollouts held at once, in batches; more are told to ask again."""
 MAX_UNKNOWN_LEASES = 1024
+MAX_FAULTS = 64
 
 Held = tuple[Request[Rollout, Receipt], Rollout]
 
@@ -56,7 +57,8 @@ class Intake:
         self.counters: Counter[str] = Counter(
             rollouts_accepted=0, rollouts_dropped=0, rollouts_repeated=0
         )
-        self.last_error = ""
+        self.faults: deque[str] = deque(maxlen=MAX_FAULTS)
+        """Rollouts dropped because somebody got something wrong, oldest first."""
         self._inbox = inbox
         self._clock = clock
         self._cfg = cfg
@@ -176,7 +178,8 @@ class Intake:
         elif ruling.decision is Decision.LATER and not self._is_too_late(rollout.lease):
             request.refuse(ruling.reason, retry=True)
         else:
-            log.info("rollout_dropped", name=rollout.name, reason=ruling.reason)
+            if ruling.is_fault or ruling.decision is Decision.LATER:
+                self.faults.append(f"rollout {rollout.name} of {rollout.actor}: {ruling.reason}")
             self._drop(request, ruling.reason)
 
     def _rule(self, rollout: Rollout, version: int) -> Ruling:
@@ -205,5 +208,5 @@ class Intake:
 
     def _drop(self, request: Request[Rollout, Receipt], reason: str) -> None:
         self.counters["rollouts_dropped"] += 1
-        self.last_error = f"dropped rollout {request.message.name}: {reason}"
+        log.info("rollout_dropped", name=request.message.name, reason=reason)
         request.reply(Receipt(accepted=False, reason=reason))

@@ -39,6 +39,8 @@ from shared.runtime.service import Health
 
 log = structlog.get_logger()
 
+MAX_INCIDENTS = 256
+"""What one learner process tells the report of; a flood would say nothing more."""
 REPORT_TIMEOUT = 5.0
 """Seconds to wait for the league before a version is reported again."""
 
@@ -154,6 +156,9 @@ class Learner:
         self._incidents.pump()
         entering = self._meta.rollouts if self._reports.unacknowledged else ()
         did |= self._intake.take(self.version, entering)
+        while self._intake.faults:
+            self._last_error = self._intake.faults.popleft()
+            self._note("rollout_refused", self._last_error)
         if self._announced and self._intake.samples >= self._intake.needed(self.version):
             self._update()
             did = True
@@ -343,7 +348,7 @@ class Learner:
 
     def _note(self, kind: str, detail: str) -> None:
         """Tell the report of something worth a line."""
-        if self._incidents.full:
+        if self._incidents.full or self._incident_sequence >= MAX_INCIDENTS:
             return
         self._incidents.put(
             Incident(
@@ -379,7 +384,7 @@ class Learner:
             waiting_seconds=self._clock.now() - self._waiting_since if waiting else 0.0,
             rates=rates,
             counters={**self._intake.counters, "updates": self._updates},
-            last_error=self._intake.last_error or self._last_error,
+            last_error=self._last_error,
         )
 
     def close(self) -> None:
