@@ -14,10 +14,9 @@ import numpy as np
 
 from benchmarks.harness import cpu_of, interleaved, median
 from benchmarks.rollouts import rollout_of
-from services.actor.collector import Collector
+from services.actor.collector import Collector, Verdict
 from services.jobs.bench import Check, Measurement
 from services.league.config import LeagueConfig
-from shared.game.bout import Judgement
 from shared.game.reward import RewardConfig
 from shared.game.rules import RuleBook
 from shared.messages.training import ACTION_DIM, OBS_DIM
@@ -75,7 +74,7 @@ class Loop:
         for _ in range(WARM_UP):
             self.play()
 
-    def keep_command(self, judgement: Judgement) -> None:
+    def keep_command(self, verdict: Verdict) -> None:
         """Keep what was just commanded; counted on the actor's side."""
         self.commands[self.at] = self.env.batch.ctrl
         self.at += 1

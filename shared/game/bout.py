@@ -23,7 +23,10 @@ Floats = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True)
 class Judgement:
-    """What one step of N bouts looked like, and what it paid."""
+    """What one step of N bouts looked like, and what it paid.
+
+    Of several steps at once: every array has the steps on an axis before the bouts.
+    """
 
     points: Floats
     """float64[N], the antagonist's points."""
@@ -34,6 +37,18 @@ class Judgement:
     """float64[2, N] (m), surface to surface, antagonist first; negative inside."""
     bat_distance: Floats
     """float64[N] (m), surface to surface; negative where they overlap."""
+
+    @property
+    def newest(self) -> "Judgement":
+        """Return the last step of several."""
+        return Judgement(
+            self.points[-1],
+            self.antagonist_in_target[-1],
+            self.protagonist_in_target[-1],
+            self.contact[-1],
+            self.target_distance[:, -1],
+            self.bat_distance[-1],
+        )
 
 
 class Scoreboard:
@@ -59,11 +74,7 @@ class Scoreboard:
             grips: float64[3, 2, N], origins of the bat frames in the world, antagonist first.
             quaternions: float64[4, 2, N], their orientations, w x y z.
         """
-        directions = blade_direction(quaternions)
-        to_target = distance_to_target(grips, directions, self.bat, self.target)
-        between = distance_between_bats(
-            grips[:, 0], directions[:, 0], grips[:, 1], directions[:, 1], self.bat
-        )
+        to_target, between = self._distances(grips, quaternions)
         in_target = to_target <= 0.0
         contact = between <= 0.0
         self.camping = count_camping(self.camping, in_target[1])
@@ -75,6 +86,40 @@ class Scoreboard:
         self.attack_steps += in_target[0] ^ penalty
         self.camping_steps += is_camping_paid(self.camping, self.rules)
         return Judgement(points, in_target[0], in_target[1], contact, to_target, between)
+
+    def judge_steps(self, grips: Floats, quaternions: Floats) -> Judgement:
+        """Score K steps that followed each other at once: the same verdicts for less time.
+
+        Args:
+            grips: float64[3, 2, K, N], as for ``judge``, in the order they were played.
+            quaternions: float64[4, 2, K, N].
+
+        Returns:
+            Arrays with the steps before the bouts: [K, N], distances to the target [2, K, N].
+        """
+        to_target, between = self._distances(grips, quaternions)
+        in_target = to_target <= 0.0
+        contact = between <= 0.0
+        camping = np.empty(contact.shape, np.int32)
+        for step, is_inside in enumerate(in_target[1]):
+            self.camping = camping[step] = count_camping(self.camping, is_inside)
+        points = score_step(in_target[0], contact, camping, self.rules)
+        self.step += len(contact)
+        self.score += points.sum(axis=0)
+        penalty = in_target[0] & contact
+        self.penalty_steps += penalty.sum(axis=0, dtype=np.int32)
+        self.attack_steps += (in_target[0] ^ penalty).sum(axis=0, dtype=np.int32)
+        self.camping_steps += is_camping_paid(camping, self.rules).sum(axis=0, dtype=np.int32)
+        return Judgement(points, in_target[0], in_target[1], contact, to_target, between)
+
+    def _distances(self, grips: Floats, quaternions: Floats) -> tuple[Floats, Floats]:
+        """Return how far the bats are from the target, and from each other."""
+        directions = blade_direction(quaternions)
+        to_target = distance_to_target(grips, directions, self.bat, self.target)
+        between = distance_between_bats(
+            grips[:, 0], directions[:, 0], grips[:, 1], directions[:, 1], self.bat
+        )
+        return to_target, between
 
     def finished(self) -> Bools:
         """Return bool[N], whether each bout has run its full time."""

@@ -21,6 +21,9 @@ Float32s = NDArray[np.float32]
 Longs = NDArray[np.int64]
 
 _POSE_DIM = 7
+UNJUDGED_STEPS = 10
+"""Most steps that may wait to be judged: enough to spread the cost of asking, and their arrays
+stay in the cache."""
 START_NOISE_RAD = 0.1
 """Uniform noise on each joint of the en-garde pose."""
 
@@ -54,6 +57,9 @@ class FencingEnv:
         self._bats = by_side[:, :, :BAT_DIM]
         self._poses = by_side[:, :, :_POSE_DIM].transpose(2, 1, 0)
         self._tools = by_side[:, :, BAT_DIM:].transpose(1, 2, 0)
+        self._played = np.empty((_POSE_DIM, 2, UNJUDGED_STEPS, num_envs))
+        self.unjudged = 0
+        """Steps played and not judged yet."""
         self._commands = self.batch.ctrl.reshape(num_envs, 2, _POSE_DIM).transpose(1, 2, 0)
 
     def observe(self, antagonist: Float32s, protagonist: Float32s) -> None:
@@ -63,7 +69,8 @@ class FencingEnv:
             antagonist: float32[N, 27], written.
             protagonist: float32[N, 27], written.
         """
-        seconds: Floats = self.scores.step * np.float64(self.model.cfg.control_timestep)
+        steps = self.scores.step + self.unjudged
+        seconds: Floats = steps * np.float64(self.model.cfg.control_timestep)
         self._encoder.encode(self._bats, seconds, (antagonist, protagonist))
 
     def step(self, antagonist: Float32s, protagonist: Float32s) -> Judgement:
@@ -72,15 +79,47 @@ class FencingEnv:
         Args:
             antagonist: float32[N, 6], actions in units of their bounds, unclipped.
             protagonist: float32[N, 6].
+
+        Raises:
+            ValueError: if steps of ``advance`` have not been judged.
         """
+        if self.unjudged:
+            raise ValueError(f"{self.unjudged} steps are not judged yet: call judge() first")
+        self._command(antagonist, protagonist)
+        self.batch.step()
+        poses = np.ascontiguousarray(self._poses)
+        return self.scores.judge(poses[:3], poses[3:])
+
+    def advance(self, antagonist: Float32s, protagonist: Float32s) -> None:
+        """Carry out one control step in every bout, to be judged later with its successors.
+
+        Args:
+            antagonist: float32[N, 6], as for ``step``.
+            protagonist: float32[N, 6].
+
+        Raises:
+            ValueError: if ``UNJUDGED_STEPS`` steps wait to be judged.
+        """
+        if self.unjudged == UNJUDGED_STEPS:
+            raise ValueError(f"{self.unjudged} steps are not judged yet: call judge() first")
+        self._command(antagonist, protagonist)
+        self.batch.step()
+        self._played[:, :, self.unjudged] = self._poses
+        self.unjudged += 1
+
+    def judge(self) -> Judgement:
+        """Judge all steps since the last time, K of them; see ``Scoreboard.judge_steps``."""
+        played = np.ascontiguousarray(self._played[:, :, : self.unjudged])
+        self.unjudged = 0
+        return self.scores.judge_steps(played[:3], played[3:])
+
+    def _command(self, antagonist: Float32s, protagonist: Float32s) -> None:
+        """Turn actions into the poses that the servos are to reach."""
         actions = np.empty((2, ACTION_DIM, self.num_envs))
         actions[0] = antagonist.T
         actions[1] = protagonist.T
         offsets = bounded_offset(actions, self._action)
         self._commands[:] = desired_pose(offsets, np.ascontiguousarray(self._tools))
-        self.batch.step()
-        poses = np.ascontiguousarray(self._poses)
-        return self.scores.judge(poses[:3], poses[3:])
 
     def reset(
         self, bouts: Longs, generator: np.random.Generator, first_step: NDArray[np.int32] | int = 0
@@ -92,6 +131,7 @@ class FencingEnv:
             generator: draws the noise.
             first_step: steps that count as already gone (staggered starts).
         """
+        self.unjudged = 0
         noise = generator.uniform(-START_NOISE_RAD, START_NOISE_RAD, (len(bouts), 14))
         self.batch.reset(bouts, self.model.en_garde.reshape(-1) + noise)
         self.scores.reset(bouts, first_step)
