@@ -205,9 +205,7 @@ def _train(
     from shared.bus.zenoh import open_zenoh
 
     clock = SystemClock()
-    # Runs side by side need a port each; a site file that names one gets that one.
-    is_named = settings.bus.listen != BusConfig().listen
-    endpoint = settings.bus.listen[0] if is_named else f"tcp/127.0.0.1:{free_port()}"
+    endpoint = _endpoint(settings.bus)
     atomic_write(folder / "endpoint.json", json.dumps({"connect": endpoint, "run": run}).encode())
     supervisor = Supervisor(processes(settings, folder, run, endpoint), folder / "logs", clock)
     try:
@@ -232,6 +230,24 @@ def _train(
         for event in supervisor.stop():
             log.info("process_stopped", process=event.name, exit_code=event.exit_code)
         (folder / "endpoint.json").unlink(missing_ok=True)
+
+
+def _endpoint(cfg: BusConfig) -> str:
+    """Return where the run's router listens: a free port, or where the site file says.
+
+    Raises:
+        ConfigError: another program listens there.
+    """
+    if cfg.listen == BusConfig().listen:  # runs side by side need a port each
+        return f"tcp/127.0.0.1:{free_port()}"
+    endpoint = cfg.listen[0]
+    port = int(endpoint.rpartition(":")[2])
+    if port and free_port(port) != port:
+        raise ConfigError(
+            f"bus.listen: {endpoint} is in use by another program; stop it, name another port, "
+            "or leave bus.listen out to get a free one"
+        )
+    return endpoint
 
 
 def _wait_for_router(endpoint: str, supervisor: Supervisor, stop: threading.Event) -> None:
