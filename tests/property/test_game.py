@@ -56,6 +56,7 @@ def slow_distances(grips: Floats, quaternions: Floats) -> tuple[list[float], flo
     return to_target, literal.segment_to_segment(*blades) - 2 * BAT.radius
 
 
+@settings(deadline=None)
 @given(STEPS, st.integers(1, 5), st.booleans())
 def test_the_rule_equals_the_papers_algorithm_on_any_sequence(
     steps: list[tuple[bool, bool, bool]], free_steps: int, once: bool
@@ -69,6 +70,7 @@ def test_the_rule_equals_the_papers_algorithm_on_any_sequence(
     assert points == literal.paper_points(steps, free_steps, once=once)
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.booleans(), st.integers(1, 700)), max_size=8), st.booleans())
 def test_long_waits_in_the_target_pay_as_in_the_paper(
     runs: list[tuple[bool, int]], once: bool
@@ -210,6 +212,7 @@ FINITE: dict[str, Any] = {"allow_nan": False, "allow_infinity": False}
 DISTANCES = st.floats(-1.0, 1e6, **FINITE)
 
 
+@settings(deadline=None)
 @given(
     st.tuples(DISTANCES, DISTANCES), DISTANCES,
     st.floats(1e-3, 100.0), st.floats(0.0, 1.0), st.floats(0.0, 10.0), st.floats(0.0, 10.0),

@@ -194,6 +194,7 @@ def refuses_or_reads(payload: bytes) -> None:
         unpack(payload)
 
 
+@settings(deadline=None)
 @given(st.binary(max_size=300))
 def test_noise_is_never_worse_than_refused(payload: bytes) -> None:
     refuses_or_reads(payload)
