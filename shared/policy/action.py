@@ -59,6 +59,12 @@ def _lengths(vectors: Floats) -> Floats:
     return np.sqrt(np.add.reduce(vectors * vectors, axis=-2))
 
 
+_FACTORS = 3 + np.array([[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]])
+_SIGNS = np.array([[1, 1, 1, 1], [-1, 1, -1, 1], [-1, 1, 1, -1], [-1, -1, 1, 1]])[:, :, None] * 1.0
+"""The product of two quaternions: which number of the tool's pose, and with which sign, each
+number of the turn (a row) meets in each number of the result (a column)."""
+
+
 def desired_pose(offsets: Floats, tools: Floats) -> Floats:
     """Return the poses to command: the tools' current poses moved by offsets.
 
@@ -74,13 +80,12 @@ def desired_pose(offsets: Floats, tools: Floats) -> Floats:
     half = 0.5 * offsets[..., 3:, :]
     angle = _lengths(half)
     sine = np.sin(angle)
-    a = np.sqrt(1.0 - sine * sine)  # half a turn is never reached: the cosine is positive
+    turn = np.empty((*tools.shape[:-2], 4, tools.shape[-1]))
+    turn[..., 0, :] = np.sqrt(1.0 - sine * sine)  # never half a turn: the cosine is positive
     # The floor keeps 0 / 0 out; half is 0 there anyway.
-    half *= (sine / np.maximum(angle, 1e-12))[..., None, :]
-    b, c, d = (half[..., i, :] for i in range(3))
-    w, x, y, z = (tools[..., i, :] for i in range(3, 7))
-    out[..., 3, :] = a * w - b * x - c * y - d * z
-    out[..., 4, :] = a * x + b * w + c * z - d * y
-    out[..., 5, :] = a * y - b * z + c * w + d * x
-    out[..., 6, :] = a * z + b * y - c * x + d * w
+    np.multiply(half, (sine / np.maximum(angle, 1e-12))[..., None, :], out=turn[..., 1:, :])
+    products = tools.take(_FACTORS, axis=-2)
+    products *= _SIGNS
+    products *= turn[..., :, None, :]
+    np.add.reduce(products, axis=-3, out=out[..., 3:, :])
     return out
