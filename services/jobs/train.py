@@ -9,6 +9,7 @@ import contextlib
 import datetime
 import json
 import os
+import shutil
 import socket
 import sys
 import threading
@@ -47,6 +48,10 @@ log = structlog.get_logger()
 POLL_SECONDS = 0.1
 FREE_BYTES = 256 << 20
 """A run needs this much disk to begin with."""
+LEAST_FREE_BYTES = 4 << 20
+"""With less than this a run ends, while there is room for a last word."""
+SPACE_SECONDS = 1.0
+"""Period in which the free space is looked at."""
 ROUTER_SECONDS = 60.0
 """How long the router may take to come up on a busy machine."""
 EXIT_INTERRUPTED = 130
@@ -216,7 +221,7 @@ def _train(
             contextlib.closing(open_zenoh(bus_cfg, "train", clock, run)) as bus,
             _dashboard(bus, clock, folder) as dashboard,
         ):
-            watcher = _Watcher(bus, clock, supervisor, dashboard)
+            watcher = _Watcher(bus, clock, supervisor, dashboard, folder)
             watcher.tell(started)
             while not watcher.finished:
                 if stop.is_set():
@@ -273,12 +278,19 @@ class _Watcher:
     """Follows a run: its schedule, its processes, what the report should mention."""
 
     def __init__(
-        self, bus: Bus, clock: SystemClock, supervisor: Supervisor, dashboard: "Dashboard"
+        self,
+        bus: Bus,
+        clock: SystemClock,
+        supervisor: Supervisor,
+        dashboard: "Dashboard",
+        folder: Path,
     ) -> None:
         self._bus = bus
         self._clock = clock
         self._supervisor = supervisor
         self._dashboard = dashboard
+        self._folder = folder
+        self._space_due_at = clock.now()
         self._schedule = bus.subscribe(SCHEDULE)
         self._incidents: Outbox[Incident, Receipt] = Outbox(
             bus, INCIDENT, clock, window=256, timeout=5.0
@@ -290,8 +302,11 @@ class _Watcher:
         """Do one round.
 
         Raises:
-            RiposteError: a process was given up; the run can be resumed.
+            RiposteError: a process was given up, or the disk is full; the run can be resumed.
         """
+        if (now := self._clock.now()) >= self._space_due_at:
+            self._space_due_at = now + SPACE_SECONDS
+            self._check_space()
         self.tell(self._supervisor.poll())
         self._incidents.pump()
         while (schedule := self._schedule.take()) is not None:
@@ -309,7 +324,17 @@ class _Watcher:
                 self._note(event)
                 self._dashboard.say(event.describe)
             if event.kind == "gave_up":
+                self._check_space()
                 raise RiposteError(f"{event.describe}\n{event.tail}".rstrip())
+
+    def _check_space(self) -> None:
+        free = shutil.disk_usage(self._folder).free
+        if free < LEAST_FREE_BYTES:
+            raise RiposteError(
+                f"no space left: {self._folder} has {free / (1 << 20):.1f} MiB free; nothing that "
+                f"was learned is lost, free some and continue with: riposte train --resume "
+                f"--out {self._folder}"
+            )
 
     def _note(self, event: ProcessEvent) -> None:
         if self._incidents.full:

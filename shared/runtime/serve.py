@@ -235,5 +235,8 @@ def stop_on_signals(deadline: float = CLOSE_SECONDS) -> Generator[threading.Even
 
 
 def _say(args: ServeArgs, text: str, code: int) -> int:
-    sys.stderr.write(f"{args.name}: {text}\n")
+    with contextlib.suppress(
+        OSError
+    ):  # where stderr is a file on a full disk, the code still tells
+        sys.stderr.write(f"{args.name}: {text}\n")
     return code

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 from services.league.history import RunState
 from services.league.ledger import open_read_only
+from shared.errors import LedgerError
 
 X = TypeVar("X")
 ROOT = Path(__file__).resolve().parents[3]
@@ -133,9 +134,10 @@ def state_of(folder: Path) -> RunState:
 
 def updates_of(folder: Path) -> int:
     """Return how many updates the ledger has so far."""
-    if not (folder / "league.sqlite").exists():
+    try:
+        return sum(record.updates for record in state_of(folder).stages)
+    except LedgerError:  # not there yet, or just being made
         return 0
-    return sum(record.updates for record in state_of(folder).stages)
 
 
 def one_line(text: str) -> str:
