@@ -142,7 +142,9 @@ class Actor:
                 self._account(rollout.name, accepted=False, reason=reason)
         for results, receipt in self._results.pump():
             did = True
-            if not receipt.accepted:
+            if receipt.accepted:
+                log.info("results_acknowledged", name=results.name)
+            else:
                 self._last_error = f"results {results.name} dropped: {receipt.reason}"
                 log.warning("results_dropped", name=results.name, reason=receipt.reason)
         for results, reason in self._results.take_refused():

@@ -54,6 +54,8 @@ SPACE_SECONDS = 1.0
 """Period in which the free space is looked at."""
 ROUTER_SECONDS = 60.0
 """How long the router may take to come up on a busy machine."""
+HAND_OVER_SECONDS = 5.0
+"""How long the end of a run waits for its last incidents to be entered."""
 EXIT_INTERRUPTED = 130
 
 
@@ -231,6 +233,7 @@ def _train(
                     view = False
                     webbrowser.open(live.url)
                 bus.wait(POLL_SECONDS)
+            watcher.hand_over()
     finally:
         for event in supervisor.stop():
             log.info("process_stopped", process=event.name, exit_code=event.exit_code)
@@ -312,6 +315,13 @@ class _Watcher:
         while (schedule := self._schedule.take()) is not None:
             self.finished = schedule.finished
         self._dashboard.tick(self._supervisor.restarts)
+
+    def hand_over(self) -> None:
+        """Give the league a moment to enter the last incidents."""
+        deadline = self._clock.now() + HAND_OVER_SECONDS
+        while self._incidents.unacknowledged and self._clock.now() < deadline:
+            self._incidents.pump()
+            self._bus.wait(POLL_SECONDS)
 
     def tell(self, events: Sequence[ProcessEvent]) -> None:
         """Log what happened to processes, and have the report mention what should not have."""
