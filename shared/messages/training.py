@@ -10,7 +10,7 @@ AGENTS: tuple[Agent, Agent] = ("antagonist", "protagonist")
 OBS_DIM = 27
 """Own bat pose and velocity (13), other bat pose and velocity (13), time (1)."""
 ACTION_DIM = 6
-"""Offset of the tool: translation (3) and rotation vector (3), each in units of its bound."""
+"""Offset of the tool: translation (3) and rotation (3), each in units of its bound."""
 
 
 class Rollout(Message, frozen=True, kw_only=True):

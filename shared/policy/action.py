@@ -31,9 +31,10 @@ class ActionConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
 ACTION_SCHEMA = schema_hash(
     {
-        "fields": ["translation[3]", "rotation_vector[3]"],
+        "fields": ["translation[3]", "rotation[3]"],
         "units": "of the bound; longer vectors are shortened to it",
-        "frame": "torso_lift_link; pose = (p + translation, exp(rotation) q) of gripper_tool_frame",
+        "rotation": "twice the Gibbs vector: axis times 2 tan(angle / 2)",
+        "frame": "torso_lift_link; pose = (p + translation, rotation q) of gripper_tool_frame",
     }
 )
 
@@ -46,46 +47,37 @@ def bounded_offset(actions: Floats, cfg: ActionConfig) -> Floats:
         cfg: the bounds.
 
     Returns:
-        float64[..., 6, N]: translation (m) and rotation vector (rad).
+        float64[..., 6, N]: translation (m) and rotation (axis times 2 tan(angle / 2); rad to one
+        part in 3,000 at the bound).
     """
     vectors = actions.reshape(*actions.shape[:-2], 2, 3, actions.shape[-1])
     bounds = np.array([[cfg.offset_bound_m], [cfg.offset_bound_rad]])
-    scale = bounds / np.maximum(_lengths(vectors), 1.0)
+    lengths = np.sqrt(np.add.reduce(vectors * vectors, axis=-2))
+    scale = bounds / np.maximum(lengths, 1.0)
     return (vectors * scale[..., None, :]).reshape(actions.shape)
 
 
-def _lengths(vectors: Floats) -> Floats:
-    """Return float64[..., N], the lengths of float64[..., 3, N]."""
-    return np.sqrt(np.add.reduce(vectors * vectors, axis=-2))
-
-
-_FACTORS = 3 + np.array([[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]])
-_SIGNS = np.array([[1, 1, 1, 1], [-1, 1, -1, 1], [-1, 1, 1, -1], [-1, -1, 1, 1]])[:, :, None] * 1.0
-"""The product of two quaternions: which number of the tool's pose, and with which sign, each
-number of the turn (a row) meets in each number of the result (a column)."""
+_FACTORS = 3 + np.array([[1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]])
+_SIGNS = 0.5 * np.array([[-1, 1, -1, 1], [-1, 1, 1, -1], [-1, -1, 1, 1]])[:, :, None]
+"""Half the product of a vector and a quaternion: which number of the tool's pose, and with which
+sign, each number of the vector (a row) meets in each number of the result (a column)."""
 
 
 def desired_pose(offsets: Floats, tools: Floats) -> Floats:
     """Return the poses to command: the tools' current poses moved by offsets.
 
     Args:
-        offsets: float64[..., 6, N], translation (m) and rotation vector (rad) in the torso frame.
+        offsets: float64[..., 6, N], translation (m) and rotation in the torso frame, as
+            :func:`bounded_offset` returns them.
         tools: float64[..., 7, N], position and orientation (w x y z) in the torso frame.
 
     Returns:
-        float64[..., 7, N].
+        float64[..., 7, N]; the quaternions are longer than one by 1 / cos(angle / 2).
     """
-    out = np.empty_like(tools)
-    np.add(tools[..., :3, :], offsets[..., :3, :], out=out[..., :3, :])
-    half = 0.5 * offsets[..., 3:, :]
-    angle = _lengths(half)
-    sine = np.sin(angle)
-    turn = np.empty((*tools.shape[:-2], 4, tools.shape[-1]))
-    turn[..., 0, :] = np.sqrt(1.0 - sine * sine)  # never half a turn: the cosine is positive
-    # The floor keeps 0 / 0 out; half is 0 there anyway.
-    np.multiply(half, (sine / np.maximum(angle, 1e-12))[..., None, :], out=turn[..., 1:, :])
+    out = tools.copy()
+    out[..., :3, :] += offsets[..., :3, :]
     products = tools.take(_FACTORS, axis=-2)
     products *= _SIGNS
-    products *= turn[..., :, None, :]
-    np.add.reduce(products, axis=-3, out=out[..., 3:, :])
+    products *= offsets[..., 3:, None, :]
+    out[..., 3:, :] += np.add.reduce(products, axis=-3)
     return out

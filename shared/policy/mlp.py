@@ -40,8 +40,9 @@ class GaussianPolicy:
         self.weights = weights
         self.std: Floats = np.exp(weights.log_std)
         """float32[action_dim]."""
-        self._scale = np.float32(1.0) / (weights.obs_std + NORMALISER_EPSILON)
+        scale = np.float32(1.0) / (weights.obs_std + NORMALISER_EPSILON)
         self._layers = [(np.ascontiguousarray(w.T), b) for w, b in weights.layers]
+        self._layers[0][0][:] *= scale[:, None]
         self._log_normaliser = float(np.sum(weights.log_std, dtype=np.float64)) + (
             0.5 * len(weights.log_std) * math.log(2.0 * math.pi)
         )
@@ -56,7 +57,6 @@ class GaussianPolicy:
             float32[N, action_dim].
         """
         hidden: Floats = np.subtract(obs, self.weights.obs_mean)
-        hidden *= self._scale
         *body, (last_weight, last_bias) = self._layers
         for weight, bias in body:
             hidden = hidden @ weight

@@ -23,6 +23,9 @@ _TIME = 2 * BAT_DIM
 _ONE = _TIME + 1
 """Where the time, and a one that carries the shifts, stand behind the bats' states."""
 
+_SEEN = 2 * BAT_DIM + 1
+"""How many numbers an observer sees."""
+
 OWN_REFERENCE = (0.58, 0.55, -0.33, 0.49)
 OTHER_REFERENCE = (0.49, -0.33, -0.55, -0.58)
 """Orientations about which q and -q are told apart: the bats in the en-garde pose."""
@@ -66,7 +69,7 @@ class ObservationEncoder:
         products: list[Floats] = []
         for own, yaw in enumerate(yaws):
             turn, shift = _turn_and_shift(np.asarray(centre), yaw)
-            seen = np.zeros((2 * BAT_DIM + 2, 2 * BAT_DIM + 1))
+            seen = np.zeros((2 * BAT_DIM + 2, _SEEN))
             for place, bat in enumerate((own, 1 - own)):
                 rows = slice(bat * BAT_DIM, (bat + 1) * BAT_DIM)
                 columns = slice(place * BAT_DIM, (place + 1) * BAT_DIM)
@@ -78,9 +81,8 @@ class ObservationEncoder:
                 start = place * BAT_DIM + _QUATERNION
                 products.append(seen[:, start : start + 4] @ reference)
         products.append(np.eye(2 * BAT_DIM + 2)[_ONE])  # the sign of what has none to choose
-        self._maps = [seen.astype(np.float32) for seen in maps]
-        self._products = np.stack(products, axis=1).astype(np.float32)
-        self._spreads = [_spread(observer, len(yaws)) for observer in range(len(yaws))]
+        self._map = np.hstack([*maps, np.stack(products, axis=1)]).astype(np.float32)
+        self._spread = np.hstack([_spread(observer, len(yaws)) for observer in range(len(yaws))])
 
     def encode(self, bats: Floats, seconds: Floats, outs: Sequence[Observations]) -> None:
         """Write what each observer sees.
@@ -95,15 +97,16 @@ class ObservationEncoder:
         known[:, :_TIME].reshape(-1, 2, BAT_DIM)[:] = bats.reshape(-1, 2, BAT_DIM)
         known[:, _TIME] = seconds
         known[:, _ONE] = 1.0
-        signs = np.copysign(np.float32(1.0), known @ self._products)
-        for out, seen, spread in zip(outs, self._maps, self._spreads, strict=True):
-            np.matmul(known, seen, out=out)
-            out *= signs @ spread
+        seen = known @ self._map
+        factors = np.copysign(np.float32(1.0), seen[:, len(outs) * _SEEN :]) @ self._spread
+        for observer, out in enumerate(outs):
+            columns = slice(observer * _SEEN, (observer + 1) * _SEEN)
+            np.multiply(seen[:, columns], factors[:, columns], out=out)
 
 
 def _spread(observer: int, observers: int) -> Observations:
     """Return float32[2 * observers + 1, 27]: signs, a one at their end, to a factor a number."""
-    spread = np.zeros((2 * observers + 1, 2 * BAT_DIM + 1), np.float32)
+    spread = np.zeros((2 * observers + 1, _SEEN), np.float32)
     spread[-1] = 1.0
     for place in range(2):
         start = place * BAT_DIM + _QUATERNION
