@@ -23,6 +23,8 @@ class RewardConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """Distance (m) at which the closeness terms have fallen to 1/e."""
     guard_weight: float = 0.25
     """Share of the protagonist's shaping that is for staying close to an attacking bat."""
+    keep_out: float = 0.1
+    """Distance from the target (m) from which the protagonist's bat is well out of it."""
 
     def __post_init__(self) -> None:
         """Check the ranges."""
@@ -30,6 +32,8 @@ class RewardConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
             raise ValueError(f"score_scale ({self.score_scale}) must be positive")
         if self.reach <= 0.0:
             raise ValueError(f"reach ({self.reach} m) must be positive")
+        if self.keep_out <= 0.0:
+            raise ValueError(f"keep_out ({self.keep_out} m) must be positive")
         if not 0.0 <= self.guard_weight <= 1.0:
             raise ValueError(f"guard_weight ({self.guard_weight}) must be in [0, 1]")
 
@@ -45,9 +49,14 @@ def antagonist_shaping(judgement: Judgement, cfg: RewardConfig) -> Floats:
 
 
 def protagonist_shaping(judgement: Judgement, cfg: RewardConfig) -> Floats:
-    """Return float64[N] in [0, 1]: bat on the attacking bat, and not in the target itself."""
+    """Return float64[N] in [0, 1]: bat on the attacking bat, and well out of the target itself.
+
+    The way out pays by the centimetre: an attacker who lures the bat to and fro across the edge
+    would otherwise make it camp (ten points a step) where a step inside or outside tells nothing.
+    """
     guard = closeness(judgement.bat_distance, cfg.reach)
-    return cfg.guard_weight * guard + (1.0 - cfg.guard_weight) * ~judgement.protagonist_in_target
+    out = np.clip(judgement.target_distance[1] / cfg.keep_out, 0.0, 1.0)
+    return cfg.guard_weight * guard + (1.0 - cfg.guard_weight) * out
 
 
 def reward(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shared.game.bout import Judgement
-from shared.game.reward import RewardConfig, reward
+from shared.game.reward import RewardConfig, protagonist_shaping, reward
 
 STEP = Judgement(
     points=np.array([1.0, -10.0]),
@@ -36,9 +36,23 @@ def test_without_shaping_only_the_score_counts():
     np.testing.assert_allclose(reward(0, broken, 1.0, 0.0, RewardConfig()), [0.1, -1.0])
 
 
+def test_the_way_out_of_the_target_pays_by_the_centimetre():
+    cfg = RewardConfig(guard_weight=0.0, keep_out=0.1)
+    at = dataclasses.replace(
+        STEP, target_distance=np.array([[0.0, 0.0], [0.04, -0.04]]), bat_distance=np.zeros(2)
+    )
+    np.testing.assert_allclose(protagonist_shaping(at, cfg), [0.4, 0.0])
+
+
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("score_scale", 0.0), ("reach", -1.0), ("guard_weight", 1.5), ("guard_weight", -0.1)],
+    [
+        ("keep_out", 0.0),
+        ("score_scale", 0.0),
+        ("reach", -1.0),
+        ("guard_weight", 1.5),
+        ("guard_weight", -0.1),
+    ],
 )
 def test_a_scale_out_of_range_is_refused_by_name(field: str, value: float):
     with pytest.raises(ValueError, match=field):
