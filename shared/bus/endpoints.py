@@ -255,6 +255,20 @@ class Answer(Generic[Out]):
         return answer
 
 
+def ask_of(
+    host: Host, service: Service[Any, Out], key: str, message: Message, timeout: float
+) -> tuple[Answer[Out], bytes | None]:
+    """Return a request under way and its bytes; None, and refused, where they are too many."""
+    answer = Answer(host, service, key, timeout)
+    payload = encode(message)
+    host.counts.add("asks")
+    if len(payload) <= service.max_bytes:
+        return answer, payload
+    host.counts.add("refused_messages")
+    answer.on_arrival(Refused(too_long(len(payload), key, service.max_bytes)))
+    return answer, None
+
+
 class Present:
     """The living processes of one role."""
 

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from shared.bus.base import NoAnswer, Refused
 from shared.bus.counters import Counters
-from shared.bus.endpoints import Answer, Host, Requests, Values, too_long
+from shared.bus.endpoints import Answer, Host, Requests, Values, ask_of
 from shared.bus.keys import check_chunk, key_of, matches, pattern_of
 from shared.clock import Clock
 from shared.messages.message import Message
@@ -129,12 +129,8 @@ class MemoryBus:
     ) -> Answer[Out]:
         """Put a request into the inbox of the answerer that came first."""
         key = key_of(service.key, fields)
-        payload = encode(message)
-        answer = Answer(self._host, service, key, timeout)
-        self._counts.add("asks")
-        if len(payload) > service.max_bytes:
-            self._counts.add("refused_messages")
-            answer.on_arrival(Refused(too_long(len(payload), key, service.max_bytes)))
+        answer, payload = ask_of(self._host, service, key, message, timeout)
+        if payload is None:
             return answer
         offers = ((bus, inbox) for bus in self._hub.buses for inbox in bus.inboxes)
         found = next(((bus, inbox) for bus, inbox in offers if inbox.key == key), None)

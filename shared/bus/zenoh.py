@@ -30,7 +30,7 @@ from shared.bus.arrivals import take_answer, take_request, take_value
 from shared.bus.base import NoAnswer, Refused
 from shared.bus.config import BusConfig, client_json, router_json
 from shared.bus.counters import Counters
-from shared.bus.endpoints import Answer, Host, Present, Requests, Values, too_long
+from shared.bus.endpoints import Answer, Host, Present, Requests, Values, ask_of, too_long
 from shared.bus.keys import check_chunk, key_of, pattern_of
 from shared.bus.latest import LatestSent, stamp_of
 from shared.bus.reopening import Reopening
@@ -200,12 +200,8 @@ class ZenohBus:
     ) -> Answer[Out]:
         """Send a request; a congested link may hold this up for ``block_seconds``."""
         key = key_of(service.key, fields)
-        payload = encode(message)
-        answer = Answer(self._host, service, key, timeout)
-        self._counts.add("asks")
-        if len(payload) > service.max_bytes:
-            self._counts.add("refused_messages")
-            answer.on_arrival(Refused(too_long(len(payload), key, service.max_bytes)))
+        answer, payload = ask_of(self._host, service, key, message, timeout)
+        if payload is None:
             return answer
         if self._session is None:
             answer.on_arrival(NoAnswer(f"{self._without_router()} to carry {key}"))
