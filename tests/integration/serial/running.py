@@ -8,23 +8,7 @@ from pathlib import Path
 
 from services.jobs.serial import SerialRun
 from services.jobs.settings import Settings
-
-SMALL = (
-    "actor.num_envs=8",
-    "actor.rollout_steps=20",
-    "game.bout_steps=80",
-    "learner.batch_samples=640",
-    "learner.warm_up_samples=640",
-    "learner.hidden_dims=[16,16]",
-    "learner.minibatches=4",
-    "league.antagonist_updates=3",
-    "league.protagonist_updates=3",
-    "league.iterations=1",
-    "league.evaluation_bouts=8",
-    "league.convergence_min_updates=0",
-    "train.record=false",
-)
-"""A whole run in about a second: two stages of three updates, 16 evaluation bouts."""
+from tests.integration.small import SMALL
 
 RUN = "serial-run"
 
@@ -55,7 +39,7 @@ def run(
 
     Whoever leaves after ``ticks`` leaves as a killed process does: nothing is finished.
     """
-    settings = Settings.load(None, [*SMALL, *overrides])
+    settings = Settings.load(None, [*SMALL, "train.record=false", *overrides])
     done = 0
     with contextlib.closing(
         SerialRun(settings, folder, RUN, resume=resume, record=record)

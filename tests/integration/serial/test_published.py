@@ -14,7 +14,8 @@ from services.learner.ppo import PolicyOptimiser
 from shared.messages.training import ACTION_DIM, AGENTS, OBS_DIM
 from shared.policy.mlp import GaussianPolicy
 from shared.policy.snapshot import unpack
-from tests.integration.serial.running import RUN, SMALL, run
+from tests.integration.serial.running import RUN, run
+from tests.integration.small import SMALL
 
 KEEP_ALL = "learner.keep_checkpoints=100"
 

@@ -19,7 +19,8 @@ from shared.bus.memory import MemoryHub
 from shared.clock import ManualClock
 from shared.errors import CheckpointError, LedgerError
 from tests.integration.serial.conftest import Uninterrupted
-from tests.integration.serial.running import RUN, SMALL, assert_same, remains, run
+from tests.integration.serial.running import RUN, assert_same, remains, run
+from tests.integration.small import SMALL
 
 ROOT = Path(__file__).resolve().parents[3]
 

@@ -11,7 +11,8 @@ from tests.integration.training.killing import (
     assert_report_lists,
     kill_in_turn,
 )
-from tests.integration.training.training import SMALL, finish, processes_of, training
+from tests.integration.small import SMALL
+from tests.integration.training.training import finish, processes_of, training
 
 pytestmark = [pytest.mark.zenoh, pytest.mark.timeout(400)]
 

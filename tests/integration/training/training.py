@@ -14,25 +14,10 @@ from typing import Any, TypeVar
 from services.league.history import RunState
 from services.league.ledger import open_read_only
 from shared.errors import LedgerError
+from tests.integration.small import SMALL
 
 X = TypeVar("X")
 ROOT = Path(__file__).resolve().parents[3]
-
-SMALL = (
-    "actor.num_envs=8",
-    "actor.rollout_steps=20",
-    "game.bout_steps=80",
-    "learner.batch_samples=640",
-    "learner.warm_up_samples=640",
-    "learner.hidden_dims=[16,16]",
-    "learner.minibatches=4",
-    "league.antagonist_updates=3",
-    "league.protagonist_updates=3",
-    "league.iterations=1",
-    "league.evaluation_bouts=8",
-    "league.convergence_min_updates=0",
-)
-"""A whole run, but for starting and stopping, in about a second."""
 
 
 def command(folder: Path, *words: str, overrides: Sequence[str] = SMALL) -> list[str]:
