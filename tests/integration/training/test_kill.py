@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.integration.small import SMALL
 from tests.integration.training.killing import (
     IN_TURN,
     assert_nothing_lost_nor_counted_twice,
     assert_report_lists,
     kill_in_turn,
 )
-from tests.integration.small import SMALL
 from tests.integration.training.training import finish, processes_of, training
 
 pytestmark = [pytest.mark.zenoh, pytest.mark.timeout(400)]
