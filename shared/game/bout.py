@@ -13,7 +13,13 @@ from shared.game.geometry import (
     distance_between_bats,
     distance_to_target,
 )
-from shared.game.rules import RuleBook, count_camping, is_camping_paid, score_step
+from shared.game.rules import (
+    RuleBook,
+    attack_points,
+    camping_points,
+    count_camping,
+    is_camping_paid,
+)
 
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.int32]
@@ -30,6 +36,8 @@ class Judgement:
 
     points: Floats
     """float64[N], the antagonist's points."""
+    camping_points: Floats
+    """float64[N], how many of them the camping rule gave."""
     antagonist_in_target: Bools
     protagonist_in_target: Bools
     contact: Bools
@@ -43,6 +51,7 @@ class Judgement:
         """Return the last step of several."""
         return Judgement(
             self.points[-1],
+            self.camping_points[-1],
             self.antagonist_in_target[-1],
             self.protagonist_in_target[-1],
             self.contact[-1],
@@ -78,14 +87,15 @@ class Scoreboard:
         in_target = to_target <= 0.0
         contact = between <= 0.0
         self.camping = count_camping(self.camping, in_target[1])
-        points = score_step(in_target[0], contact, self.camping, self.rules)
+        camped = camping_points(self.camping, self.rules)
+        points = attack_points(in_target[0], contact, self.rules) + camped
         self.step += 1
         self.score += points
         penalty = in_target[0] & contact
         self.penalty_steps += penalty
         self.attack_steps += in_target[0] ^ penalty
         self.camping_steps += is_camping_paid(self.camping, self.rules)
-        return Judgement(points, in_target[0], in_target[1], contact, to_target, between)
+        return Judgement(points, camped, in_target[0], in_target[1], contact, to_target, between)
 
     def judge_steps(self, grips: Floats, quaternions: Floats) -> Judgement:
         """Score K steps that followed each other at once: the same verdicts for less time.
@@ -103,14 +113,15 @@ class Scoreboard:
         camping = np.empty(contact.shape, np.int32)
         for step, is_inside in enumerate(in_target[1]):
             self.camping = camping[step] = count_camping(self.camping, is_inside)
-        points = score_step(in_target[0], contact, camping, self.rules)
+        camped = camping_points(camping, self.rules)
+        points = attack_points(in_target[0], contact, self.rules) + camped
         self.step += len(contact)
         self.score += points.sum(axis=0)
         penalty = in_target[0] & contact
         self.penalty_steps += penalty.sum(axis=0, dtype=np.int32)
         self.attack_steps += (in_target[0] ^ penalty).sum(axis=0, dtype=np.int32)
         self.camping_steps += is_camping_paid(camping, self.rules).sum(axis=0, dtype=np.int32)
-        return Judgement(points, in_target[0], in_target[1], contact, to_target, between)
+        return Judgement(points, camped, in_target[0], in_target[1], contact, to_target, between)
 
     def _distances(self, grips: Floats, quaternions: Floats) -> tuple[Floats, Floats]:
         """Return how far the bats are from the target, and from each other."""

@@ -25,6 +25,10 @@ class RewardConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """Share of the protagonist's shaping that is for staying close to an attacking bat."""
     keep_out: float = 0.1
     """Distance from the target (m) from which the protagonist's bat is well out of it."""
+    lure_weight: float = 0.0
+    """Share of the camping award that rewards the antagonist as long as there is a continuous
+    part. At 1 it learns in phase one to lure a naive protagonist into camping, ten points a step,
+    instead of to attack; the game score alone (phase two) always pays in full."""
 
     def __post_init__(self) -> None:
         """Check the ranges."""
@@ -34,6 +38,8 @@ class RewardConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
             raise ValueError(f"reach ({self.reach} m) must be positive")
         if self.keep_out <= 0.0:
             raise ValueError(f"keep_out ({self.keep_out} m) must be positive")
+        if not 0.0 <= self.lure_weight <= 1.0:
+            raise ValueError(f"lure_weight ({self.lure_weight}) must be in [0, 1]")
         if not 0.0 <= self.guard_weight <= 1.0:
             raise ValueError(f"guard_weight ({self.guard_weight}) must be in [0, 1]")
 
@@ -75,8 +81,10 @@ def reward(
         float64[N].
     """
     sign = 1.0 if side == 0 else -1.0
-    value = (sign * score_weight * cfg.score_scale) * judgement.points
-    if shaping_weight != 0.0:
-        shaping = antagonist_shaping if side == 0 else protagonist_shaping
-        value = value + shaping_weight * shaping(judgement, cfg)
-    return value
+    scale = sign * score_weight * cfg.score_scale
+    if shaping_weight == 0.0:
+        return scale * judgement.points
+    if side == 1:
+        return scale * judgement.points + shaping_weight * protagonist_shaping(judgement, cfg)
+    points = judgement.points - (1.0 - cfg.lure_weight) * judgement.camping_points
+    return scale * points + shaping_weight * antagonist_shaping(judgement, cfg)

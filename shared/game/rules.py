@@ -65,19 +65,29 @@ def is_camping_paid(camping: Ints, rules: RuleBook) -> Bools:
     return too_long & ((camping - 1) % rules.camping_steps == 0)
 
 
-def score_step(
-    antagonist_in_target: Bools, contact: Bools, camping: Ints, rules: RuleBook
-) -> Floats:
-    """Return the antagonist's points for one 10 ms step in each of N bouts.
+def attack_points(antagonist_in_target: Bools, contact: Bools, rules: RuleBook) -> Floats:
+    """Return what attacking pays the antagonist in one 10 ms step of each of N bouts.
 
     Args:
         antagonist_in_target: bool[N], the antagonist's bat reaches into the target.
         contact: bool[N], the two bats touch.
+        rules: the rule book.
+
+    Returns:
+        float64[N].
+    """
+    return np.where(contact, rules.penalty, rules.point) * antagonist_in_target
+
+
+def camping_points(camping: Ints, rules: RuleBook) -> Floats:
+    """Return what the protagonist's camping pays the antagonist in one step of each of N bouts.
+
+    Args:
         camping: int32[N], consecutive steps the protagonist's bat has been in the target.
         rules: the rule book.
 
     Returns:
         float64[N].
     """
-    attack: Floats = np.where(contact, rules.penalty, rules.point) * antagonist_in_target
-    return attack + rules.camping_award * is_camping_paid(camping, rules)
+    points: Floats = rules.camping_award * is_camping_paid(camping, rules).astype(np.float64)
+    return points

@@ -16,7 +16,7 @@ from shared.game.geometry import (
     distance_to_target,
 )
 from shared.game.reward import RewardConfig, antagonist_shaping, protagonist_shaping, reward
-from shared.game.rules import RuleBook, count_camping, score_step
+from shared.game.rules import RuleBook, attack_points, camping_points, count_camping
 from tests.unit.game import literal
 
 Floats = NDArray[np.float64]
@@ -66,7 +66,8 @@ def test_the_rule_equals_the_papers_algorithm_on_any_sequence(
     points = []
     for a_in, contact, p_in in steps:
         camping = count_camping(camping, np.array([p_in]))
-        points.append(float(score_step(np.array([a_in]), np.array([contact]), camping, rules)[0]))
+        attack = attack_points(np.array([a_in]), np.array([contact]), rules)
+        points.append(float(attack[0] + camping_points(camping, rules)[0]))
     assert points == literal.paper_points(steps, free_steps, once=once)
 
 
@@ -78,11 +79,10 @@ def test_long_waits_in_the_target_pay_as_in_the_paper(
     rules = RuleBook(camping="once" if once else "every_step")
     steps = [(False, False, inside) for inside, length in runs for _ in range(length)]
     camping = np.zeros(1, np.int32)
-    no = np.zeros(1, np.bool_)
     points = []
     for _, _, p_in in steps:
         camping = count_camping(camping, np.array([p_in]))
-        points.append(float(score_step(no, no, camping, rules)[0]))
+        points.append(float(camping_points(camping, rules)[0]))
     assert points == literal.paper_points(steps, 200, once=once)
 
 
@@ -229,6 +229,7 @@ def test_shaping_is_bounded_and_the_game_part_is_zero_sum(
     distances = np.array(to_target)[:, None]
     judgement = Judgement(
         points=np.array([-10.0]),
+        camping_points=np.zeros(1),
         antagonist_in_target=distances[0] <= 0,
         protagonist_in_target=distances[1] <= 0,
         contact=np.array([between]) <= 0,

@@ -11,6 +11,7 @@ from shared.game.reward import RewardConfig, protagonist_shaping, reward
 
 STEP = Judgement(
     points=np.array([1.0, -10.0]),
+    camping_points=np.zeros(2),
     antagonist_in_target=np.array([True, True]),
     protagonist_in_target=np.array([False, True]),
     contact=np.array([False, True]),
@@ -36,6 +37,21 @@ def test_without_shaping_only_the_score_counts():
     np.testing.assert_allclose(reward(0, broken, 1.0, 0.0, RewardConfig()), [0.1, -1.0])
 
 
+def test_with_shaping_a_lured_protagonist_pays_itself_but_not_the_antagonist():
+    camped = dataclasses.replace(
+        STEP, points=np.array([10.0, 1.0]), camping_points=np.array([10.0, 0.0])
+    )
+    cfg = RewardConfig(score_scale=0.1, lure_weight=0.2)
+
+    def game(side: int, shaping: float) -> list[float]:
+        whole = reward(side, camped, 1.0, shaping, cfg)
+        return (whole - (reward(side, camped, 0.0, shaping, cfg) if shaping else 0.0)).tolist()
+
+    assert game(0, 0.0) == pytest.approx([1.0, 0.1])
+    assert game(0, 0.4) == pytest.approx([0.2, 0.1])
+    assert game(1, 0.4) == game(1, 0.0) == pytest.approx([-1.0, -0.1])
+
+
 def test_the_way_out_of_the_target_pays_by_the_centimetre():
     cfg = RewardConfig(guard_weight=0.0, keep_out=0.1)
     at = dataclasses.replace(
@@ -48,6 +64,7 @@ def test_the_way_out_of_the_target_pays_by_the_centimetre():
     ("field", "value"),
     [
         ("keep_out", 0.0),
+        ("lure_weight", 1.5),
         ("score_scale", 0.0),
         ("reach", -1.0),
         ("guard_weight", 1.5),

@@ -4,12 +4,19 @@ import msgspec
 import numpy as np
 import pytest
 
-from shared.game.rules import RuleBook, count_camping, is_camping_paid, score_step
+from shared.game.rules import (
+    RuleBook,
+    attack_points,
+    camping_points,
+    count_camping,
+    is_camping_paid,
+)
 
 
 def points(a_in: bool, contact: bool, camping: int, rules: RuleBook | None = None) -> float:
     rules = rules or RuleBook()
-    found = score_step(np.array([a_in]), np.array([contact]), np.array([camping], np.int32), rules)
+    found = attack_points(np.array([a_in]), np.array([contact]), rules)
+    found += camping_points(np.array([camping], np.int32), rules)
     return float(found[0])
 
 
