@@ -7,60 +7,33 @@ stands, and ends with the report. ``--serial`` runs the same services in one pro
 import argparse
 import contextlib
 import datetime
-import json
 import os
-import shutil
-import socket
 import sys
 import threading
-import webbrowser
 from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import msgspec
-import structlog
-
+from services.jobs.processes import StopAsked, run_processes
 from services.jobs.settings import BUDGETS, Settings, TrainConfig
-from services.supervisor import ProcessEvent, ProcessSpec, Supervisor, service_command
+from services.supervisor import ProcessSpec, service_command
 from shared.bus.base import Bus
-from shared.bus.config import BusConfig
-from shared.bus.delivery import Outbox
-from shared.bus.ports import free_port
-from shared.clock import SystemClock
-from shared.errors import ConfigError, RiposteError
-from shared.messages.league import Incident
-from shared.messages.topics import INCIDENT, SCHEDULE
-from shared.messages.training import AGENTS, Receipt
+from shared.clock import Clock, SystemClock
+from shared.errors import ConfigError
+from shared.messages.training import AGENTS
 from shared.runtime.files import RunLock, atomic_write, require_free_space
 from shared.runtime.logging import configure_logging
 from shared.runtime.process import THREAD_LIMITS
 from shared.runtime.serve import run_id_of, stop_on_signals
-from shared.telemetry.door import read_live_view
 
 if TYPE_CHECKING:
     from services.jobs.dashboard import Dashboard
 
 __all__ = ["TrainConfig", "main"]
 
-log = structlog.get_logger()
-
-POLL_SECONDS = 0.1
 FREE_BYTES = 256 << 20
 """A run needs this much disk to begin with."""
-LEAST_FREE_BYTES = 4 << 20
-"""With less than this a run ends, while there is room for a last word."""
-SPACE_SECONDS = 1.0
-"""Period in which the free space is looked at."""
-ROUTER_SECONDS = 60.0
-"""How long the router may take to come up on a busy machine."""
-HAND_OVER_SECONDS = 5.0
-"""How long the end of a run waits for its last incidents to be entered."""
 EXIT_INTERRUPTED = 130
-
-
-class StopAsked(Exception):  # noqa: N818 - it is no error
-    """The person at the terminal asked to stop."""
 
 
 def main(argv: Sequence[str]) -> int:
@@ -209,161 +182,21 @@ def _train(
     settings: Settings, folder: Path, run: str, stop: threading.Event, *, view: bool
 ) -> None:
     """Run the processes until the schedule is done."""
-    from shared.bus.zenoh import open_zenoh
-
-    clock = SystemClock()
-    endpoint = _endpoint(settings.bus)
-    atomic_write(folder / "endpoint.json", json.dumps({"connect": endpoint, "run": run}).encode())
-    supervisor = Supervisor(processes(settings, folder, run, endpoint), folder / "logs", clock)
-    try:
-        started = supervisor.start()
-        _wait_for_router(endpoint, supervisor, stop)
-        bus_cfg = msgspec.structs.replace(settings.bus, connect=(endpoint,))
-        with (
-            contextlib.closing(open_zenoh(bus_cfg, "train", clock, run)) as bus,
-            _dashboard(bus, clock, folder) as dashboard,
-        ):
-            watcher = _Watcher(bus, clock, supervisor, dashboard, folder)
-            watcher.tell(started)
-            while not watcher.finished:
-                if stop.is_set():
-                    raise StopAsked
-                watcher.tick()
-                if view and (live := read_live_view(folder)) is not None:
-                    view = False
-                    webbrowser.open(live.url)
-                bus.wait(POLL_SECONDS)
-            watcher.hand_over()
-    finally:
-        for event in supervisor.stop():
-            log.info("process_stopped", process=event.name, exit_code=event.exit_code)
-        (folder / "endpoint.json").unlink(missing_ok=True)
-
-
-def _endpoint(cfg: BusConfig) -> str:
-    """Return where the run's router listens: a free port, or where the site file says.
-
-    Raises:
-        ConfigError: another program listens there.
-    """
-    if cfg.listen == BusConfig().listen:  # runs side by side need a port each
-        return f"tcp/127.0.0.1:{free_port()}"
-    endpoint = cfg.listen[0]
-    port = int(endpoint.rpartition(":")[2])
-    if port and free_port(port) != port:
-        raise ConfigError(
-            f"bus.listen: {endpoint} is in use by another program; stop it, name another port, "
-            "or leave bus.listen out to get a free one"
-        )
-    return endpoint
-
-
-def _wait_for_router(endpoint: str, supervisor: Supervisor, stop: threading.Event) -> None:
-    """Wait until the router accepts a connection.
-
-    Raises:
-        RiposteError: it was given up, or did not come up in time.
-    """
-    host, _, port = endpoint.partition("/")[2].rpartition(":")
-    for _ in range(round(ROUTER_SECONDS / POLL_SECONDS)):
-        if stop.is_set():
-            raise StopAsked
-        for event in supervisor.poll():
-            if event.kind == "gave_up":
-                raise RiposteError(f"{event.describe}\n{event.tail}".rstrip())
-        with contextlib.suppress(OSError), socket.create_connection((host, int(port)), 1.0):
-            return
-        stop.wait(POLL_SECONDS)
-    raise RiposteError(f"the router did not listen on {endpoint} within {ROUTER_SECONDS:g} s")
-
-
-class _Watcher:
-    """Follows a run: its schedule, its processes, what the report should mention."""
-
-    def __init__(
-        self,
-        bus: Bus,
-        clock: SystemClock,
-        supervisor: Supervisor,
-        dashboard: "Dashboard",
-        folder: Path,
-    ) -> None:
-        self._bus = bus
-        self._clock = clock
-        self._supervisor = supervisor
-        self._dashboard = dashboard
-        self._folder = folder
-        self._space_due_at = clock.now()
-        self._schedule = bus.subscribe(SCHEDULE)
-        self._incidents: Outbox[Incident, Receipt] = Outbox(
-            bus, INCIDENT, clock, window=256, timeout=5.0
-        )
-        self._sequence = 0
-        self.finished = False
-
-    def tick(self) -> None:
-        """Do one round.
-
-        Raises:
-            RiposteError: a process was given up, or the disk is full; the run can be resumed.
-        """
-        if (now := self._clock.now()) >= self._space_due_at:
-            self._space_due_at = now + SPACE_SECONDS
-            self._check_space()
-        self.tell(self._supervisor.poll())
-        self._incidents.pump()
-        while (schedule := self._schedule.take()) is not None:
-            self.finished = schedule.finished
-        self._dashboard.tick(self._supervisor.restarts)
-
-    def hand_over(self) -> None:
-        """Give the league a moment to enter the last incidents."""
-        deadline = self._clock.now() + HAND_OVER_SECONDS
-        while self._incidents.unacknowledged and self._clock.now() < deadline:
-            self._incidents.pump()
-            self._bus.wait(POLL_SECONDS)
-
-    def tell(self, events: Sequence[ProcessEvent]) -> None:
-        """Log what happened to processes, and have the report mention what should not have."""
-        for event in events:
-            log.info(
-                f"process_{event.kind}", process=event.name, pid=event.pid,
-                exit_code=event.exit_code,
-            )  # fmt: skip
-            if event.kind in ("died", "restarted", "gave_up"):
-                self._note(event)
-                self._dashboard.say(event.describe)
-            if event.kind == "gave_up":
-                self._check_space()
-                raise RiposteError(f"{event.describe}\n{event.tail}".rstrip())
-
-    def _check_space(self) -> None:
-        free = shutil.disk_usage(self._folder).free
-        if free < LEAST_FREE_BYTES:
-            raise RiposteError(
-                f"no space left: {self._folder} has {free / (1 << 20):.1f} MiB free; nothing that "
-                f"was learned is lost, free some and continue with: riposte train --resume "
-                f"--out {self._folder}"
-            )
-
-    def _note(self, event: ProcessEvent) -> None:
-        if self._incidents.full:
-            return
-        self._incidents.put(
-            Incident(
-                source="train",
-                boot=self._bus.boot,
-                sequence=self._sequence,
-                kind=f"process_{event.kind}",
-                detail=event.describe[:2000],
-                at_ns=self._clock.wall_ns(),
-            )
-        )
-        self._sequence += 1
+    run_processes(
+        "train",
+        lambda endpoint: processes(settings, folder, run, endpoint),
+        lambda bus, clock: _dashboard(bus, clock, folder),
+        settings.bus,
+        folder,
+        run,
+        stop,
+        again=f"riposte train --resume --out {folder}",
+        view=view,
+    )
 
 
 @contextlib.contextmanager
-def _dashboard(bus: Bus, clock: SystemClock, folder: Path) -> "Generator[Dashboard]":
+def _dashboard(bus: Bus, clock: Clock, folder: Path) -> "Generator[Dashboard]":
     """Show where the run stands for as long as the block lasts."""
     from services.jobs.dashboard import Dashboard
 

@@ -1,0 +1,239 @@
+"""Runs the processes of a run on this machine until its schedule is done, and says how it goes."""
+
+import contextlib
+import json
+import shutil
+import socket
+import threading
+import webbrowser
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Protocol
+
+import msgspec
+import structlog
+
+from services.supervisor import ProcessEvent, ProcessSpec, Supervisor
+from shared.bus.base import Bus
+from shared.bus.config import BusConfig
+from shared.bus.delivery import Outbox
+from shared.bus.ports import free_port
+from shared.clock import Clock, SystemClock
+from shared.errors import ConfigError, RiposteError
+from shared.messages.league import Incident
+from shared.messages.topics import INCIDENT, SCHEDULE
+from shared.messages.training import Receipt
+from shared.runtime.files import atomic_write
+from shared.telemetry.door import read_live_view
+
+log = structlog.get_logger()
+
+POLL_SECONDS = 0.1
+LEAST_FREE_BYTES = 4 << 20
+"""With less than this a run ends, while there is room for a last word."""
+SPACE_SECONDS = 1.0
+"""Period in which the free space is looked at."""
+ROUTER_SECONDS = 60.0
+"""How long the router may take to come up on a busy machine."""
+HAND_OVER_SECONDS = 5.0
+"""How long the end of a run waits for its last incidents to be entered."""
+
+
+class StopAsked(Exception):  # noqa: N818 - it is no error
+    """The person at the terminal asked to stop."""
+
+
+class Display(Protocol):
+    """Shows a person how the run goes."""
+
+    def tick(self, restarts: Mapping[str, int]) -> None:
+        """Draw what is new; ``restarts`` counts how often each process was started again."""
+        ...
+
+    def say(self, text: str) -> None:
+        """Show an event."""
+        ...
+
+
+def run_processes(
+    job: str,
+    specs: Callable[[str], Sequence[ProcessSpec]],
+    display: Callable[[Bus, Clock], AbstractContextManager[Display]],
+    cfg: BusConfig,
+    folder: Path,
+    run: str,
+    stop: threading.Event,
+    *,
+    again: str,
+    view: bool = False,
+) -> None:
+    """Start processes, watch them until the schedule is done, stop them in order.
+
+    Args:
+        job: name of this process on the bus and in incidents.
+        specs: returns what to start, given the endpoint of the router, which comes first.
+        display: shows how it goes.
+        cfg: of the bus.
+        folder: of the run.
+        run: its name on the bus.
+        stop: set when the person at the terminal asks to stop.
+        again: the command that continues the run.
+        view: open the live view in a browser.
+
+    Raises:
+        StopAsked: ``stop`` was set.
+        RiposteError: a process was given up, or the disk is full.
+    """
+    from shared.bus.zenoh import open_zenoh
+
+    clock = SystemClock()
+    endpoint = _endpoint(cfg)
+    atomic_write(folder / "endpoint.json", json.dumps({"connect": endpoint, "run": run}).encode())
+    supervisor = Supervisor(specs(endpoint), folder / "logs", clock)
+    try:
+        started = supervisor.start()
+        _wait_for_router(endpoint, supervisor, stop)
+        bus_cfg = msgspec.structs.replace(cfg, connect=(endpoint,))
+        with (
+            contextlib.closing(open_zenoh(bus_cfg, job, clock, run)) as bus,
+            display(bus, clock) as shown,
+        ):
+            watcher = _Watcher(bus, clock, supervisor, shown, folder, again)
+            watcher.tell(started)
+            while not watcher.finished:
+                if stop.is_set():
+                    raise StopAsked
+                watcher.tick()
+                if view and (live := read_live_view(folder)) is not None:
+                    view = False
+                    webbrowser.open(live.url)
+                bus.wait(POLL_SECONDS)
+            watcher.hand_over()
+    finally:
+        for event in supervisor.stop():
+            log.info("process_stopped", process=event.name, exit_code=event.exit_code)
+        (folder / "endpoint.json").unlink(missing_ok=True)
+
+
+def _endpoint(cfg: BusConfig) -> str:
+    """Return where the run's router listens: a free port, or where the site file says.
+
+    Raises:
+        ConfigError: another program listens there.
+    """
+    if cfg.listen == BusConfig().listen:  # runs side by side need a port each
+        return f"tcp/127.0.0.1:{free_port()}"
+    endpoint = cfg.listen[0]
+    port = int(endpoint.rpartition(":")[2])
+    if port and free_port(port) != port:
+        raise ConfigError(
+            f"bus.listen: {endpoint} is in use by another program; stop it, name another port, "
+            "or leave bus.listen out to get a free one"
+        )
+    return endpoint
+
+
+def _wait_for_router(endpoint: str, supervisor: Supervisor, stop: threading.Event) -> None:
+    """Wait until the router accepts a connection.
+
+    Raises:
+        RiposteError: it was given up, or did not come up in time.
+    """
+    host, _, port = endpoint.partition("/")[2].rpartition(":")
+    for _ in range(round(ROUTER_SECONDS / POLL_SECONDS)):
+        if stop.is_set():
+            raise StopAsked
+        for event in supervisor.poll():
+            if event.kind == "gave_up":
+                raise RiposteError(f"{event.describe}\n{event.tail}".rstrip())
+        with contextlib.suppress(OSError), socket.create_connection((host, int(port)), 1.0):
+            return
+        stop.wait(POLL_SECONDS)
+    raise RiposteError(f"the router did not listen on {endpoint} within {ROUTER_SECONDS:g} s")
+
+
+class _Watcher:
+    """Follows a run: its schedule, its processes, what the report should mention."""
+
+    def __init__(
+        self,
+        bus: Bus,
+        clock: Clock,
+        supervisor: Supervisor,
+        display: Display,
+        folder: Path,
+        again: str,
+    ) -> None:
+        self._bus = bus
+        self._clock = clock
+        self._supervisor = supervisor
+        self._display = display
+        self._folder = folder
+        self._again = again
+        self._space_due_at = clock.now()
+        self._schedule = bus.subscribe(SCHEDULE)
+        self._incidents: Outbox[Incident, Receipt] = Outbox(
+            bus, INCIDENT, clock, window=256, timeout=5.0
+        )
+        self._sequence = 0
+        self.finished = False
+
+    def tick(self) -> None:
+        """Do one round.
+
+        Raises:
+            RiposteError: a process was given up, or the disk is full; the run can be resumed.
+        """
+        if (now := self._clock.now()) >= self._space_due_at:
+            self._space_due_at = now + SPACE_SECONDS
+            self._check_space()
+        self.tell(self._supervisor.poll())
+        self._incidents.pump()
+        while (schedule := self._schedule.take()) is not None:
+            self.finished = schedule.finished
+        self._display.tick(self._supervisor.restarts)
+
+    def hand_over(self) -> None:
+        """Give the league a moment to enter the last incidents."""
+        deadline = self._clock.now() + HAND_OVER_SECONDS
+        while self._incidents.unacknowledged and self._clock.now() < deadline:
+            self._incidents.pump()
+            self._bus.wait(POLL_SECONDS)
+
+    def tell(self, events: Sequence[ProcessEvent]) -> None:
+        """Log what happened to processes, and have the report mention what should not have."""
+        for event in events:
+            log.info(
+                f"process_{event.kind}", process=event.name, pid=event.pid,
+                exit_code=event.exit_code,
+            )  # fmt: skip
+            if event.kind in ("died", "restarted", "gave_up"):
+                self._note(event)
+                self._display.say(event.describe)
+            if event.kind == "gave_up":
+                self._check_space()
+                raise RiposteError(f"{event.describe}\n{event.tail}".rstrip())
+
+    def _check_space(self) -> None:
+        free = shutil.disk_usage(self._folder).free
+        if free < LEAST_FREE_BYTES:
+            raise RiposteError(
+                f"no space left: {self._folder} has {free / (1 << 20):.1f} MiB free; nothing that "
+                f"was entered is lost, free some and continue with: {self._again}"
+            )
+
+    def _note(self, event: ProcessEvent) -> None:
+        if self._incidents.full:
+            return
+        self._incidents.put(
+            Incident(
+                source=self._bus.name,
+                boot=self._bus.boot,
+                sequence=self._sequence,
+                kind=f"process_{event.kind}",
+                detail=event.describe[:2000],
+                at_ns=self._clock.wall_ns(),
+            )
+        )
+        self._sequence += 1
