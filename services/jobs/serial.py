@@ -139,7 +139,7 @@ class SerialRun:
     @property
     def finished(self) -> bool:
         """Return whether the schedule is done."""
-        return self.league.state.finished
+        return self.league.finished
 
     @property
     def cut_number(self) -> int:

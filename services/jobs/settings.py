@@ -42,12 +42,17 @@ BUDGETS: dict[str, tuple[str, ...]] = {
         "league.antagonist_updates=60",
         "league.protagonist_updates=80",
         "league.evaluation_bouts=64",
+        "league.round_iterations=6",
+        "league.round_antagonist_updates=2",
+        "league.round_protagonist_updates=2",
     ),
     "standard": (),
     "paper": (
         "league.antagonist_updates=200",
         "league.protagonist_updates=600",
         "league.evaluation_bouts=256",
+        "league.iterations=2",
+        "league.round_iterations=35",
     ),
 }
 """Overrides by budget; ``standard`` is what the defaults say."""
@@ -100,7 +105,10 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True):
         per_rollout = self.actor.rollout_steps * self.actor.num_envs
         batch = max(self.learner.batch_samples, self.learner.warm_up_samples)
         league = msgspec.structs.replace(
-            self.league, seed=self.train.seed, batch_rollouts=math.ceil(batch / per_rollout)
+            self.league,
+            seed=self.train.seed,
+            batch_rollouts=math.ceil(batch / per_rollout),
+            points_per_reward=1.0 / self.reward.score_scale,
         )
         learner = msgspec.structs.replace(self.learner, seed=self.train.seed)
         recorder = msgspec.structs.replace(self.recorder, bout_steps=self.game.bout_steps)

@@ -225,6 +225,10 @@ class Desk:
             case StageStarted(stage=stage):
                 log.info("stage_started", stage=stage.index, agent=stage.agent)
                 self.message = f"stage {stage.index + 1}: {stage.agent} learns"
+                if stage.round:
+                    opponent = self._state.player_label(stage.opponent)
+                    where = f"round {stage.round}, iteration {stage.iteration}"
+                    self.message = f"{where}: {stage.agent} learns against {opponent}"
             case StageEnded():
                 log.info("stage_ended", stage=event.stage, reason=event.reason)
             case RunFinished():

@@ -148,6 +148,8 @@ class BoutsPlayed(Event, frozen=True, kw_only=True):
     penalty_steps: tuple[int, ...]
     camping_steps: tuple[int, ...]
     complete: tuple[bool, ...]
+    features: tuple[tuple[float, ...], ...] = ()
+    """Of each bout of an evaluation: the antagonist's eight, then the protagonist's."""
 
     @property
     def key(self) -> str:
@@ -209,14 +211,30 @@ class IncidentNoted(Event, frozen=True, kw_only=True):
 
 
 class RunFinished(Event, frozen=True, kw_only=True):
-    """The last event of a run that went to its end."""
+    """The run went to its end; the last event, unless the run is taken up again."""
 
     kind: ClassVar[str] = "run_finished"
+    number: int = 0
+    """How often the run had been finished before."""
 
     @property
     def key(self) -> str:
-        """Return the one key."""
-        return "run"
+        """Return the one key, or that of a later end."""
+        return f"run:{self.number}" if self.number else "run"
+
+
+class RunReopened(Event, frozen=True, kw_only=True):
+    """A finished run goes on: its settings ask for more than it had played."""
+
+    kind: ClassVar[str] = "run_reopened"
+    number: int
+    """Counts from 1."""
+    config: LeagueConfig
+
+    @property
+    def key(self) -> str:
+        """Return the number."""
+        return str(self.number)
 
 
 EVENTS: tuple[type[Event], ...] = (
@@ -231,6 +249,7 @@ EVENTS: tuple[type[Event], ...] = (
     EvaluationDone,
     IncidentNoted,
     RunFinished,
+    RunReopened,
 )
 _BY_KIND = {event.kind: event for event in EVENTS}
 

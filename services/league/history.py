@@ -10,81 +10,10 @@ from collections.abc import Iterable
 from services.league import events
 from services.league.config import LeagueConfig
 from services.league.events import Entry, LeaseEnd
-from shared.messages.league import Stage
-from shared.messages.training import AGENTS, Agent, UpdateMetrics
+from services.league.records import CurvePoint, StageRecord, VersionRecord
+from shared.messages.training import AGENTS, Agent
 
 SCRIPTED_STATIC = "scripted:static"
-
-
-@dataclasses.dataclass(frozen=True)
-class VersionRecord:
-    """One policy version in the ledger."""
-
-    agent: Agent
-    version: int
-    stage: int
-    """-1 for version 0."""
-    snapshot: str
-    """Content hash (64 hex digits)."""
-    rollouts: tuple[str, ...]
-    metrics: UpdateMetrics | None
-    at_ns: int
-
-    @property
-    def ref(self) -> str:
-        """Return the player reference of this version."""
-        return f"sha256:{self.snapshot}"
-
-
-@dataclasses.dataclass
-class CurvePoint:
-    """The complete training bouts that ended while a stage had made ``update`` updates."""
-
-    update: int
-    """Updates of the stage so far, from 0."""
-    total_samples: int
-    """Samples both agents together had learned from, over the whole run."""
-    at_ns: int
-    """When the first of these bouts entered the ledger."""
-    score: list[float] = dataclasses.field(default_factory=list[float])
-    """The antagonist's total of each bout."""
-    attack_steps: list[int] = dataclasses.field(default_factory=list[int])
-    penalty_steps: list[int] = dataclasses.field(default_factory=list[int])
-    camping_steps: list[int] = dataclasses.field(default_factory=list[int])
-
-    @property
-    def mean(self) -> float:
-        """Return the mean score; there is at least one bout in every point."""
-        return sum(self.score) / len(self.score)
-
-
-@dataclasses.dataclass
-class StageRecord:
-    """One stage: its order, the versions made in it, the bouts played in it."""
-
-    stage: Stage
-    started_at_ns: int
-    ended_at_ns: int | None = None
-    end_reason: str = ""
-    """``converged`` or ``budget``; empty while it runs."""
-    end_version: int = -1
-    end_snapshot: str = ""
-    """Content hash of what the agent had learned when the stage ended."""
-    versions: list[VersionRecord] = dataclasses.field(default_factory=list[VersionRecord])
-    points: list[CurvePoint] = dataclasses.field(default_factory=list[CurvePoint])
-    """Learning curve, oldest first; updates in which no complete bout ended have no point."""
-    complete_bouts: int = 0
-    incomplete_bouts: int = 0
-
-    @property
-    def updates(self) -> int:
-        """Return how many updates were made in this stage."""
-        return len(self.versions)
-
-    @property
-    def samples(self) -> int:
-        """Return the samples learned from in this stage."""
-        return sum(version.metrics.samples for version in self.versions if version.metrics)
 
 
 @dataclasses.dataclass
@@ -99,6 +28,12 @@ class EvaluationRecord:
     attack_steps: list[int] = dataclasses.field(default_factory=list[int])
     penalty_steps: list[int] = dataclasses.field(default_factory=list[int])
     camping_steps: list[int] = dataclasses.field(default_factory=list[int])
+    features: list[tuple[float, ...]] = dataclasses.field(default_factory=list[tuple[float, ...]])
+    """Both sides' eight, antagonist first; empty in a ledger from before they were measured."""
+    number: list[int] = dataclasses.field(default_factory=list[int])
+    """Of each bout in the lists above, in the plan."""
+    seed: list[int] = dataclasses.field(default_factory=list[int])
+    """Of the batch each was played in."""
     played: list[bool] = dataclasses.field(default_factory=list[bool])
     """By bout number of the plan; bouts may finish in any order."""
 
@@ -141,9 +76,11 @@ class RunState:
     seed: int = 0
     serial: bool = False
     config: LeagueConfig | None = None
-    """As of the start of the run."""
+    """As of the start of the run, or of the last time it was taken up again."""
     started_at_ns: int = 0
     finished_at_ns: int | None = None
+    ends: int = 0
+    """How often the run was finished: more than once when it was taken up again."""
     stages: list[StageRecord] = dataclasses.field(default_factory=list[StageRecord])
     versions: dict[Agent, dict[int, VersionRecord]] = dataclasses.field(
         default_factory=lambda: {agent: {} for agent in AGENTS}
@@ -205,6 +142,11 @@ class RunState:
     # What people ask of it ------------------------------------------------------------------
 
     @property
+    def is_tournament(self) -> bool:
+        """Return whether the ledger began with an evaluation: nobody learns, no stages."""
+        return not self.stages and self.evaluation_started_at_ns is not None
+
+    @property
     def stage(self) -> StageRecord | None:
         """Return the stage that runs now, None between stages and after the last."""
         last = self.stages[-1] if self.stages else None
@@ -234,21 +176,49 @@ class RunState:
         """Return the highest version number of an agent, -1 before version 0."""
         return max(self.versions[agent], default=-1)
 
-    def stage_ends(self, agent: Agent) -> list[StageRecord]:
-        """Return the ended stages in which an agent learned, oldest first."""
+    def stage_ends(self, agent: Agent, round: int | None = None) -> list[StageRecord]:
+        """Return the ended stages in which an agent learned, oldest first.
+
+        Args:
+            agent: who.
+            round: of phase two, 0 for phase one; all without it.
+        """
         return [
             record
             for record in self.stages
-            if record.stage.agent == agent and record.ended_at_ns is not None
+            if record.stage.agent == agent
+            and record.ended_at_ns is not None
+            and round in (None, record.stage.round)
         ]
+
+    def warm_start(self) -> tuple[str, str] | None:
+        """Return antagonist and protagonist as phase one left them, None before both have."""
+        antagonist, protagonist = (self.stage_ends(agent, 0) for agent in AGENTS)
+        if not antagonist or not protagonist:
+            return None
+        return antagonist[-1].end_ref, protagonist[-1].end_ref
+
+    def library(self) -> list[tuple[int, str, str]]:
+        """Return round, antagonist and protagonist of every round that has been played out."""
+        last = max((record.stage.round for record in self.stages), default=0)
+        found: list[tuple[int, str, str]] = []
+        for number in range(1, last + 1):
+            antagonist, protagonist = (self.stage_ends(agent, number) for agent in AGENTS)
+            if not antagonist or not protagonist:
+                continue
+            planned = (self.config or LeagueConfig()).round_iterations
+            is_complete = protagonist[-1].stage.iteration >= planned
+            if number < last or self.finished or is_complete:
+                found.append((number, antagonist[-1].end_ref, protagonist[-1].end_ref))
+        return found
 
     def player_label(self, ref: str) -> str:
         """Return a short name for a player reference, for tables and figures."""
         if ref.startswith("scripted:"):
             return ref.removeprefix("scripted:")
         for record in self.stages:
-            if record.end_snapshot and ref == f"sha256:{record.end_snapshot}":
-                return f"{record.stage.agent} {record.stage.iteration}"
+            if record.end_snapshot and ref == record.end_ref:
+                return record.end_label
         return ref.removeprefix("sha256:")[:8]
 
     # The fold -------------------------------------------------------------------------------
@@ -277,6 +247,10 @@ class RunState:
                 self._incident(event)
             case events.RunFinished():
                 self.finished_at_ns = at_ns
+                self.ends += 1
+            case events.RunReopened():
+                self.finished_at_ns = None
+                self.config = event.config
             case _:
                 raise ValueError(f"event kind {event.kind!r} has no meaning here")
 
@@ -306,6 +280,7 @@ class RunState:
         )
         if event.stage >= 0:
             self.stages[event.stage].versions.append(record)
+            self.stages[event.stage].restarts += not event.rollouts
         self.versions[event.agent][event.version] = record
         if event.metrics is not None:
             self.total_samples[event.agent] = event.metrics.total_samples
@@ -352,8 +327,11 @@ class RunState:
         record.attack_steps.extend(event.attack_steps)
         record.penalty_steps.extend(event.penalty_steps)
         record.camping_steps.extend(event.camping_steps)
+        record.features.extend(event.features)
+        record.seed.extend([grant.seed] * grant.bouts)
         for bout in range(grant.first_bout, grant.first_bout + grant.bouts):
             record.played[bout] = True
+            record.number.append(bout)
 
     def _evaluation_planned(self, event: events.EvaluationPlanned, at_ns: int) -> None:
         self.evaluation_started_at_ns = at_ns

@@ -5,6 +5,7 @@ and what it had promised is granted again; nothing else remembers it.
 """
 
 import dataclasses
+import hashlib
 import itertools
 import math
 from collections.abc import Iterable
@@ -14,6 +15,7 @@ import numpy as np
 from services.league.config import LeagueConfig
 from services.league.events import LeaseGranted
 from services.league.history import EvaluationRecord, RunState
+from services.league.records import StageRecord
 from shared.messages.league import Lease, LeaseRequest, LeaseSummary
 
 
@@ -21,6 +23,12 @@ def lease_seed(run_seed: int, number: int) -> int:
     """Return the seed of a lease: 63 bits that follow from the run's seed and its number."""
     sequence = np.random.SeedSequence((run_seed, number))
     return int(sequence.generate_state(1, np.uint64)[0] >> np.uint64(1))
+
+
+def evaluation_seed(run_seed: int, antagonist: str, protagonist: str, first_bout: int) -> int:
+    """Return the seed of a batch of bouts: the same whoever plays it, and when."""
+    text = f"{run_seed} {antagonist} {protagonist} {first_bout}"
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little") >> 1
 
 
 def lease_window(cfg: LeagueConfig, actors: int, *, serial: bool) -> int:
@@ -38,6 +46,8 @@ def grant(state: RunState, request: LeaseRequest) -> LeaseGranted | None:
     """Return the work for an actor, None when there is none now."""
     number = len(state.leases) + 1
     record = state.stage
+    if record is not None and awaits_restart(record):
+        return None
     if record is not None:
         stage = record.stage
         learns = stage.agent == "antagonist"
@@ -66,9 +76,16 @@ def grant(state: RunState, request: LeaseRequest) -> LeaseGranted | None:
                 protagonist=evaluation.protagonist,
                 first_bout=chunk.start,
                 bouts=len(chunk),
-                seed=lease_seed(state.seed, number),
+                seed=evaluation_seed(
+                    state.seed, evaluation.antagonist, evaluation.protagonist, chunk.start
+                ),
             )
     return None
+
+
+def awaits_restart(record: StageRecord) -> bool:
+    """Return whether the learner has yet to go back to the warm start: its policy is no use."""
+    return record.stage.start == "warm" and not record.versions
 
 
 def open_chunk(state: RunState, evaluation: EvaluationRecord, most: int) -> range | None:

@@ -3,6 +3,7 @@
 Phase one, Yang et al. 2021: in each iteration the antagonist learns against the protagonist's
 latest policy until it converges or its budget is spent, then the protagonist against the
 antagonist's latest. Then everybody who came out of a stage meets everybody of the other side.
+Then come the rounds of phase two (``rounds.py``), if any are asked for.
 """
 
 from collections.abc import Sequence
@@ -14,10 +15,13 @@ from services.league.events import (
     Event,
     Pairing,
     RunFinished,
+    RunReopened,
     StageEnded,
     StageStarted,
 )
-from services.league.history import SCRIPTED_STATIC, CurvePoint, RunState, StageRecord
+from services.league.history import SCRIPTED_STATIC, RunState
+from services.league.records import CurvePoint, StageRecord
+from services.league.rounds import next_turn, phase_one_done, phase_one_stages, round_stage
 from shared.messages.league import Stage
 from shared.messages.training import AGENTS, Agent
 
@@ -27,25 +31,31 @@ MIN_WINDOW_BOUTS = 8
 
 def total_stages(cfg: LeagueConfig) -> int:
     """Return how many stages the whole run has."""
-    return cfg.iterations * len(AGENTS)
+    return phase_one_stages(cfg) + cfg.rounds * cfg.round_iterations * len(AGENTS)
 
 
 def next_event(cfg: LeagueConfig, state: RunState) -> Event | None:
     """Return the event that the schedule asks for now, None while it waits for somebody."""
     if state.finished:
+        if phase_one_done(cfg, state) and next_turn(cfg, state) is not None:
+            return RunReopened(number=state.ends, config=cfg)
         return None
     if (record := state.stage) is not None:
         return stage_end(cfg, record)
-    if len(state.stages) < total_stages(cfg):
+    if not phase_one_done(cfg, state) and not state.is_tournament:
         return stage_start(cfg, state)
-    if cfg.evaluation_bouts == 0:
-        return RunFinished()
-    if state.evaluation_started_at_ns is None:
+    if cfg.evaluation_bouts and state.evaluation_started_at_ns is None and not _in_rounds(state):
         return EvaluationPlanned(plan=0, pairings=evaluation_plan(cfg, state))
-    if state.evaluation_done_at_ns is None:
+    if state.evaluation_started_at_ns is not None and state.evaluation_done_at_ns is None:
         all_played = state.evaluation_done == state.evaluation_total
         return EvaluationDone(plan=0) if all_played else None
-    return RunFinished()
+    if not state.is_tournament and (turn := next_turn(cfg, state)) is not None:
+        return StageStarted(stage=round_stage(cfg, state, turn))
+    return RunFinished(number=state.ends)
+
+
+def _in_rounds(state: RunState) -> bool:
+    return state.stages[-1].stage.round > 0
 
 
 def waiting_for(state: RunState) -> str:
@@ -54,7 +64,7 @@ def waiting_for(state: RunState) -> str:
         return ""
     if (record := state.stage) is not None:
         return f"learner {record.stage.agent}"
-    if state.evaluation_started_at_ns is not None:
+    if state.evaluation_started_at_ns is not None and state.evaluation_done_at_ns is None:
         return "actors"
     missing = [agent for agent in AGENTS if state.latest(agent) is None]
     return " and ".join(f"learner {agent}" for agent in missing)
@@ -98,7 +108,9 @@ def stage_end(cfg: LeagueConfig, record: StageRecord) -> StageEnded | None:
         return None
     if record.updates >= record.stage.max_updates:
         reason = "budget"
-    elif converged(cfg, record.stage.agent, record.updates, record.points):
+    elif record.stage.phase == "one" and converged(
+        cfg, record.stage.agent, record.updates, record.points
+    ):
         reason = "converged"
     else:
         return None

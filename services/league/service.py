@@ -106,6 +106,11 @@ class League:
         return self._journal.state
 
     @property
+    def finished(self) -> bool:
+        """Return whether the run went to its end, and its settings ask for no more."""
+        return self.state.finished and schedule.next_event(self._cfg, self.state) is None
+
+    @property
     def ledger_position(self) -> int:
         """Return the sequence number of the last event committed."""
         return self._journal.state.position

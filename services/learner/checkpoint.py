@@ -1,7 +1,8 @@
 """A learner's checkpoints: whole or not there, checked on reading, the newest few kept.
 
 One safetensors file a version, ``checkpoint-<version:08d>.safetensors``, with one metadata entry
-``meta`` (JSON): whose it is, what it is, and the SHA-256 of its tensors.
+``meta`` (JSON): whose it is, what it is, and the SHA-256 of its tensors. One more,
+``warm.safetensors``, is kept from the end of phase one on: every round of phase two begins with it.
 """
 
 import hashlib
@@ -43,6 +44,10 @@ class Meta(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     rollouts: tuple[str, ...]
     """Names of those behind this very version."""
     metrics: UpdateMetrics | None
+    round: int = 0
+    """Round of phase two this policy has come from the warm start in; 0 in phase one."""
+    floor: int = 0
+    """Rollouts of versions before this one are of another round's policy."""
     tensors: str = ""
     """SHA-256 over names, shapes and bytes of the tensors."""
 
@@ -74,16 +79,18 @@ class CheckpointStore:
         names = self._folder.glob(f"checkpoint-{'[0-9]' * 8}.safetensors")
         return sorted((int(p.stem.removeprefix("checkpoint-")) for p in names), reverse=True)
 
+    @property
+    def warm_path(self) -> Path:
+        """Return where the end of phase one is or would be."""
+        return self._folder / "warm.safetensors"
+
     def save(self, meta: Meta, tensors: dict[str, torch.Tensor]) -> None:
         """Write a checkpoint, then forget the oldest beyond the number kept.
 
         Raises:
             RiposteError: the disk is full or not writable; older checkpoints are intact.
         """
-        arrays = {name: value.numpy() for name, value in tensors.items()}
-        meta = msgspec.structs.replace(meta, tensors=_digest(arrays))
-        text = json.dumps(msgspec.to_builtins(meta), sort_keys=True)
-        atomic_write(self.path(meta.policy_version), save(arrays, metadata={"meta": text}))
+        _write(self.path(meta.policy_version), meta, tensors)
         for old in self.versions()[self._keep :]:
             if old != meta.policy_version:
                 self.path(old).unlink(missing_ok=True)
@@ -93,6 +100,24 @@ class CheckpointStore:
         for newer in self.versions():
             if newer > version:
                 self.path(newer).unlink(missing_ok=True)
+        if self.warm_path.exists() and self.load_warm()[0].policy_version > version:
+            self.warm_path.unlink()
+
+    def save_warm(self, meta: Meta, tensors: dict[str, torch.Tensor]) -> None:
+        """Keep the end of phase one for good.
+
+        Raises:
+            RiposteError: the disk is full or not writable.
+        """
+        _write(self.warm_path, meta, tensors)
+
+    def load_warm(self) -> tuple[Meta, dict[str, torch.Tensor]]:
+        """Return the end of phase one.
+
+        Raises:
+            CheckpointError: missing, damaged, or of another run or agent; says which.
+        """
+        return self._load(self.warm_path)
 
     def load(self, version: int) -> tuple[Meta, dict[str, torch.Tensor]]:
         """Return one checkpoint.
@@ -100,7 +125,9 @@ class CheckpointStore:
         Raises:
             CheckpointError: missing, damaged, or of another run or agent; says which.
         """
-        path = self.path(version)
+        return self._load(self.path(version))
+
+    def _load(self, path: Path) -> tuple[Meta, dict[str, torch.Tensor]]:
         try:
             payload = path.read_bytes()
             header_bytes = int.from_bytes(payload[:8], "little")
@@ -145,6 +172,13 @@ class CheckpointStore:
                 "restore one, or start a new run with another --out"
             )
         return None
+
+
+def _write(path: Path, meta: Meta, tensors: dict[str, torch.Tensor]) -> None:
+    arrays = {name: value.numpy() for name, value in tensors.items()}
+    meta = msgspec.structs.replace(meta, tensors=_digest(arrays))
+    text = json.dumps(msgspec.to_builtins(meta), sort_keys=True)
+    atomic_write(path, save(arrays, metadata={"meta": text}))
 
 
 def _digest(arrays: dict[str, Any]) -> str:

@@ -27,6 +27,8 @@ class LearnerConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     """Adam's step at the start of a stage; never adaptive to KL, which late rollouts feign."""
     final_learning_rate: float = 1e-4
     """Adam's step at the end of the stage's budget; it falls linearly in between."""
+    phase_two_learning_rate: float = 3e-4
+    """Adam's step in phase two, always the same: its stages are too short for one to fall."""
     gamma: float = 0.99
     """Discount per control step."""
     gae_lambda: float = 0.95
@@ -59,7 +61,13 @@ class LearnerConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
                 f"initial_std ({self.initial_std}) must lie between minimum_std "
                 f"({self.minimum_std}) and maximum_std ({self.maximum_std}), all positive"
             )
-        for name in ("learning_rate", "final_learning_rate", "clip", "max_grad_norm"):
+        for name in (
+            "learning_rate",
+            "final_learning_rate",
+            "phase_two_learning_rate",
+            "clip",
+            "max_grad_norm",
+        ):
             if getattr(self, name) <= 0.0:
                 raise ValueError(f"{name} ({getattr(self, name)}) must be positive")
         for name in ("gamma", "gae_lambda"):

@@ -52,6 +52,8 @@ class Intake:
         """
         self.stage: Stage | None = None
         """The league's stage now, as far as it is known here."""
+        self.floor = 0
+        """Rollouts of versions before this one are of a policy that the learner has left."""
         self.applied = Applied()
         """What has been learned from."""
         self.counters: Counter[str] = Counter(
@@ -198,7 +200,7 @@ class Intake:
         if version == 0:
             return 0
         floor = 1 if self._cfg.warm_up_samples else 0
-        return max(floor, version - self._cfg.max_lag)
+        return max(floor, self.floor, version - self._cfg.max_lag)
 
     def _is_too_late(self, lease: str) -> bool:
         now = self._clock.now()

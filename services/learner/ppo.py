@@ -230,6 +230,12 @@ class PolicyOptimiser:
                 state[f"adam.{index}.{name}"] = value.detach().clone()
         return state
 
+    def reseed(self, seed: int) -> None:
+        """Draw the minibatches from another seed from now on."""
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed)
+            self._random_state = torch.get_rng_state()
+
     def restore(self, state: dict[str, torch.Tensor]) -> None:
         """Continue from what ``state`` returned.
 

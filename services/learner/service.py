@@ -2,9 +2,11 @@
 
 A rollout is answered only when a checkpoint holds the update made from it and the league has the
 version in its ledger. Whatever happens before, the actor still has the rollout and sends it again.
+
+A round of phase two begins with a version made from no rollout: policy, critic, normalisers and
+optimiser as phase one left them, the minibatches drawn from a seed of the round's own.
 """
 
-import dataclasses
 from pathlib import Path
 
 import msgspec
@@ -15,11 +17,11 @@ from services.learner.checkpoint import CheckpointStore, Meta
 from services.learner.config import LearnerConfig
 from services.learner.intake import Intake
 from services.learner.ppo import PolicyOptimiser, UpdateStats
+from services.learner.signing import RunFacts, seed_of, sign
 from shared.bus.base import Bus
 from shared.bus.delivery import Applied, Outbox
 from shared.clock import Clock
 from shared.errors import RiposteError
-from shared.game.rules import RuleBook
 from shared.messages.league import Incident
 from shared.messages.message import Bytes
 from shared.messages.topics import INCIDENT, POLICY, ROLLOUT, SCHEDULE, VERSION
@@ -31,11 +33,11 @@ from shared.messages.training import (
     VersionReceipt,
     VersionReport,
 )
-from shared.policy.action import ACTION_SCHEMA
-from shared.policy.observation import OBSERVATION_SCHEMA
-from shared.policy.snapshot import Card, Fit, Snapshot, normaliser_hash, pack
+from shared.policy.snapshot import Snapshot
 from shared.runtime.rate import Rate
 from shared.runtime.service import Health
+
+__all__ = ["Learner", "RunFacts"]
 
 log = structlog.get_logger()
 
@@ -43,17 +45,6 @@ MAX_INCIDENTS = 256
 """What one learner process tells the report of; a flood would say nothing more."""
 REPORT_TIMEOUT = 5.0
 """Seconds to wait for the league before a version is reported again."""
-
-
-@dataclasses.dataclass(frozen=True)
-class RunFacts:
-    """What a learner must know of its run to sign snapshots and to check rollouts."""
-
-    run: str
-    seed: int
-    fit: Fit
-    """With the model's hash."""
-    rules: RuleBook
 
 
 class Learner:
@@ -89,7 +80,7 @@ class Learner:
         self._facts = facts
         self._bus = bus
         self._clock = clock
-        self._optimiser = PolicyOptimiser(cfg, _seed_of(facts.seed, agent))
+        self._optimiser = PolicyOptimiser(cfg, seed_of(facts.seed, agent))
         self._store = CheckpointStore(folder, facts.run, agent, cfg.keep_checkpoints)
         self._intake = Intake(
             bus.answer(ROLLOUT, agent=agent), clock, cfg, agent, facts.fit.model or "", facts.rules
@@ -142,6 +133,7 @@ class Learner:
             )
         self._optimiser.restore(tensors)
         self._intake.applied = Applied.from_json(meta.applied)
+        self._intake.floor = meta.floor
         self._total_samples = meta.total_samples
         self._last_metrics = meta.metrics
         log.info("checkpoint_restored", version=meta.policy_version)
@@ -155,6 +147,7 @@ class Learner:
         did |= self._take_receipt()
         self._incidents.pump()
         entering = self._meta.rollouts if self._reports.unacknowledged else ()
+        did |= self._go_to_round()
         did |= self._intake.take(self.version, entering)
         while self._intake.faults:
             self._last_error = self._intake.faults.popleft()
@@ -205,6 +198,30 @@ class Learner:
         self._store.save(self._meta, self._optimiser.state())
         self._snapshot = self._make_snapshot()
         self._report()
+
+    def _go_to_round(self) -> bool:
+        """Go back to the end of phase one when a round of phase two has begun."""
+        stage = self._intake.stage
+        if stage is None or not (self._intake.in_turn and self._announced):
+            return False
+        if stage.phase != "two" or stage.round == self._meta.round:
+            return False
+        self._intake.release(f"round {stage.round} begins at the warm start")
+        if self._meta.round == 0 and not self._store.warm_path.exists():
+            self._store.save_warm(self._meta, self._optimiser.state())
+        warm, tensors = self._store.load_warm()
+        self._optimiser.restore(tensors)
+        self._optimiser.reseed(seed_of(self._facts.seed, self._agent, stage.round))
+        log.info("round_begun", round=stage.round, warm_start=warm.policy_version)
+        version = self.version + 1
+        self._intake.floor = version
+        self._meta = msgspec.structs.replace(
+            self._meta_of(version, stage.index, 0, (), None), round=stage.round
+        )
+        self._store.save(self._meta, self._optimiser.state())
+        self._snapshot = self._make_snapshot()
+        self._report()
+        return True
 
     # -- updating ---------------------------------------------------------------------------
 
@@ -264,9 +281,12 @@ class Learner:
     def _learning_rate(self, done: int) -> float:
         """Return Adam's step after so many updates of the stage: a line down to its budget's end.
 
-        It follows from the stage alone, so that late rollouts cannot move it.
+        It follows from the stage alone, so that late rollouts cannot move it. In phase two it
+        does not fall.
         """
         stage = self._intake.stage
+        if stage is not None and stage.phase == "two":
+            return self._cfg.phase_two_learning_rate
         share = 0.0 if stage is None else min(done / stage.max_updates, 1.0)
         first, last = self._cfg.learning_rate, self._cfg.final_learning_rate
         return first + share * (last - first)
@@ -290,29 +310,12 @@ class Learner:
             applied=self._intake.applied.to_json(),
             rollouts=rollouts,
             metrics=metrics,
+            round=self._meta.round if version else 0,
+            floor=self._intake.floor,
         )
 
     def _make_snapshot(self) -> Snapshot:
-        weights = self._optimiser.weights()
-        fit = self._facts.fit
-        card = Card(
-            agent=self._agent,
-            policy_version=self.version,
-            stage=self._meta.stage,
-            run=self._facts.run,
-            seed=self._facts.seed,
-            total_samples=self._total_samples,
-            observation_schema=OBSERVATION_SCHEMA,
-            action_schema=ACTION_SCHEMA,
-            normaliser=normaliser_hash(weights.obs_mean, weights.obs_std),
-            control_timestep=fit.control_timestep,
-            offset_bound_m=fit.offset_bound_m,
-            offset_bound_rad=fit.offset_bound_rad,
-            model=fit.model or "",
-            activation=self._cfg.activation,
-            hidden_dims=self._cfg.hidden_dims,
-        )
-        return pack(card, weights)
+        return sign(self._cfg, self._facts, self._meta, self._optimiser.weights())
 
     def _report(self) -> None:
         """Ask the league to enter the newest version; actors get it when that is done."""
@@ -393,8 +396,3 @@ class Learner:
 
 def _bytes(snapshot: Snapshot) -> Bytes:
     return np.frombuffer(snapshot.payload, np.uint8)
-
-
-def _seed_of(seed: int, agent: Agent) -> int:
-    """Return the agent's own seed in a run."""
-    return seed * 2 + (agent == "protagonist")

@@ -6,8 +6,14 @@ A *player reference* names who plays a side: ``sha256:<64 hex>`` for a snapshot,
 
 from typing import Annotated, Literal
 
+import msgspec
+import numpy as np
+
 from shared.messages.message import Array, ArraySpec, Bytes, Message
 from shared.messages.training import Agent
+
+FEATURE_DIM = 8
+"""Numbers that describe how a side moved in a bout."""
 
 
 class Stage(Message, frozen=True, kw_only=True):
@@ -29,6 +35,10 @@ class Stage(Message, frozen=True, kw_only=True):
     """Factor of the game score in the reward."""
     shaping_weight: float
     """Factor of the continuous reward."""
+    round: int = 0
+    """Round of phase two, from 1; 0 in phase one."""
+    start: Literal["continue", "warm"] = "continue"
+    """``warm``: the learner goes back to the end of phase one before it learns."""
 
 
 class LeaseRequest(Message, frozen=True, kw_only=True):
@@ -129,6 +139,11 @@ class BoutResults(Message, frozen=True, kw_only=True):
     """Steps that paid ten because the protagonist camped."""
     complete: Annotated[Array, ArraySpec("bool", ("K",))]
     """Played from step 0; only these count as scores."""
+    features: Annotated[Array, ArraySpec("float32", ("F", 2, FEATURE_DIM))] = msgspec.field(
+        default_factory=lambda: np.zeros((0, 2, FEATURE_DIM), np.float32)
+    )
+    """How both sides moved in each bout, antagonist first (``shared.styles.features``); measured
+    in evaluations, no rows in training."""
 
     @property
     def name(self) -> str:

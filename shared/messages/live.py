@@ -60,6 +60,13 @@ class Progress(Message, frozen=True, kw_only=True):
     """Negative when unknown."""
     message: str = ""
     """The latest event worth a line."""
+    round: int = 0
+    """Round of phase two, from 1; 0 in phase one."""
+    rounds: int = 0
+    iterations: int = 0
+    """Of this phase."""
+    opponent: str = ""
+    """Name of whom the learner meets."""
 
 
 class BoutFrames(Message, frozen=True, kw_only=True):
