@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 
 from shared.game.bout import Judgement
 from shared.game.reward import RewardConfig, reward
-from shared.messages.training import ACTION_DIM, OBS_DIM
+from shared.messages.league import FEATURE_DIM
+from shared.messages.training import ACTION_DIM, AGENTS, OBS_DIM
 from shared.policy.mlp import GaussianPolicy
 from shared.policy.players import Player
 from shared.sim.env import UNJUDGED_STEPS, FencingEnv
 
 Float32s = NDArray[np.float32]
+NOT_MEASURED: Float32s = np.zeros((0, len(AGENTS), FEATURE_DIM), np.float32)
 Verdict = Callable[[], Judgement]
 """Gives a viewer the judgement of the step just played; made only when asked for, and once."""
 
@@ -45,6 +47,8 @@ class Results:
     penalty_steps: NDArray[np.int32]
     camping_steps: NDArray[np.int32]
     complete: NDArray[np.bool_]
+    features: Float32s
+    """float32[F, 2, 8]; no rows where the style of the bouts was not measured."""
 
 
 def staggered_starts(num_envs: int, bout_steps: int, rollout_steps: int) -> NDArray[np.int32]:
@@ -61,8 +65,17 @@ def results_of(
     worlds: NDArray[np.int64],
     bouts: NDArray[np.int64],
     complete: NDArray[np.bool_],
+    features: Float32s | None = None,
 ) -> Results:
-    """Return the scoreboard of these worlds under their bout numbers."""
+    """Return the scoreboard of these worlds under their bout numbers.
+
+    Args:
+        env: the worlds.
+        worlds: int64[K], which.
+        bouts: int64[N], the number of the bout in each world.
+        complete: bool[N], whether it was played from step 0.
+        features: float32[N, 2, 8], how both sides moved in it, where that was measured.
+    """
     scores = env.scores
     return Results(
         bouts=bouts[worlds],
@@ -71,6 +84,7 @@ def results_of(
         penalty_steps=scores.penalty_steps[worlds],
         camping_steps=scores.camping_steps[worlds],
         complete=complete[worlds],
+        features=NOT_MEASURED if features is None else features[worlds],
     )
 
 
@@ -208,53 +222,3 @@ class Collector:
         )
         self._next_bout = int(values["next_bout"])
         self._generator.bit_generator.state = values["generator"]
-
-
-class Evaluation:
-    """Bouts from start to end between two fixed players."""
-
-    def __init__(
-        self, env: FencingEnv, players: tuple[Player, Player], bouts: int, seed: int
-    ) -> None:
-        """Start the bouts.
-
-        Args:
-            env: the worlds.
-            players: antagonist, protagonist.
-            bouts: how many, at most ``env.num_envs``.
-            seed: of everything random in here.
-
-        Raises:
-            ValueError: if there are more bouts than worlds.
-        """
-        if not 1 <= bouts <= env.num_envs:
-            raise ValueError(f"bouts ({bouts}) must be in 1..{env.num_envs}, one a world")
-        self._env = env
-        self._players = players
-        self._generator = np.random.default_rng(seed)
-        self._numbers = np.arange(env.num_envs, dtype=np.int64)
-        self._count = bouts
-        self.left = env.rules.bout_steps
-        env.reset(self._numbers, self._generator)
-
-    def advance(
-        self, steps: int, on_step: Callable[[Verdict], None] | None = None
-    ) -> Results | None:
-        """Play up to so many steps; return the results once the bouts are over."""
-        env = self._env
-        obs = [np.empty((env.num_envs, OBS_DIM), np.float32) for _ in self._players]
-        for _ in range(min(steps, self.left)):
-            env.observe(*obs)
-            actions = [
-                player.act(seen, self._generator)
-                for player, seen in zip(self._players, obs, strict=True)
-            ]
-            judgement = env.step(*actions)
-            self.left -= 1
-            if on_step is not None:
-                on_step(lambda judgement=judgement: judgement)
-        env.batch.check()
-        if self.left:
-            return None
-        complete = np.ones(env.num_envs, np.bool_)
-        return results_of(env, self._numbers[: self._count], self._numbers, complete)

@@ -6,8 +6,9 @@ from typing import Any
 import structlog
 from numpy.typing import NDArray
 
-from services.actor.collector import Collector, Evaluation, Results, Segment
+from services.actor.collector import Collector, Results, Segment
 from services.actor.config import ActorConfig
+from services.actor.evaluation import Evaluation
 from services.actor.frames import WORLD, FrameSampler
 from services.actor.leasing import LeaseKeeper
 from services.actor.opponents import Opponents

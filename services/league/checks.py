@@ -4,13 +4,14 @@ import math
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from services.league.events import BoutsPlayed, LeaseGranted
 from services.league.history import RunState
 from services.league.leases import is_chunk_open
 from shared.errors import SnapshotError
 from shared.game.rules import RuleBook
-from shared.messages.league import BoutResults
+from shared.messages.league import FEATURE_DIM, BoutResults
 from shared.messages.training import UpdateMetrics, VersionReport
 from shared.policy.snapshot import digest_of
 
@@ -29,6 +30,7 @@ def results_problem(state: RunState, results: BoutResults, rules: RuleBook) -> s
         or _model_problem(state, results)
         or _count_problem(results, rules)
         or _chunk_problem(state, lease.grant, results)
+        or _feature_problem(results)
     )
 
 
@@ -48,7 +50,13 @@ def played(results: BoutResults) -> BoutsPlayed:
         penalty_steps=tuple(results.penalty_steps.tolist()),
         camping_steps=tuple(results.camping_steps.tolist()),
         complete=tuple(results.complete.tolist()),
+        features=short_numbers(results.features.reshape(-1, 2 * FEATURE_DIM)),
     )
+
+
+def short_numbers(rows: NDArray[np.float32]) -> tuple[tuple[float, ...], ...]:
+    """Return float32 numbers as the shortest decimals that are read back as the same bits."""
+    return tuple(tuple(float(str(number)) for number in row) for row in rows)
 
 
 def version_problem(state: RunState, report: VersionReport) -> str:
@@ -127,6 +135,16 @@ def _count_problem(results: BoutResults, rules: RuleBook) -> str:
         return (
             f"score of bout {results.bouts[worst]} is {results.score[worst]:g}, its steps make "
             f"{expected[worst]:g} by the rule book; start every actor with the same [game] section"
+        )
+    return ""
+
+
+def _feature_problem(results: BoutResults) -> str:
+    wanted = len(results.bouts) if results.kind == "evaluate" else 0
+    if len(results.features) != wanted:
+        return (
+            f"there are features of {len(results.features)} bouts; {wanted} are expected of "
+            f"{len(results.bouts)} bouts to {results.kind}"
         )
     return ""
 

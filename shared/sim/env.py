@@ -21,6 +21,8 @@ Float32s = NDArray[np.float32]
 Longs = NDArray[np.int64]
 
 _POSE_DIM = 7
+_VELOCITY = slice(7, 10)
+"""Linear velocity, among a bat's sensors."""
 UNJUDGED_STEPS = 10
 """Most steps that may wait to be judged: enough to spread the cost of asking, and their arrays
 stay in the cache."""
@@ -57,6 +59,9 @@ class FencingEnv:
         self._bats = by_side[:, :, :BAT_DIM]
         self._poses = by_side[:, :, :_POSE_DIM].transpose(2, 1, 0)
         self._tools = by_side[:, :, BAT_DIM:].transpose(1, 2, 0)
+        self.bat_motion = (self._poses[:3], by_side[:, :, _VELOCITY].transpose(2, 1, 0))
+        """Live views, float64[3, 2, N] each, antagonist first: where the bats' grips are in the
+        world (m), and their velocities (m/s)."""
         self._played = np.empty((_POSE_DIM, 2, UNJUDGED_STEPS, num_envs))
         self.unjudged = 0
         """Steps played and not judged yet."""

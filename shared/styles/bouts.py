@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 
 from shared.errors import RiposteError
 from shared.game.rules import RuleBook
+from shared.messages.training import AGENTS
 from shared.runtime.files import atomic_write
 from shared.styles.features import FEATURES
 
 SCHEMA = 1
 """Of the file; goes up when a column changes its meaning."""
 METADATA_KEY = b"riposte"
-AGENTS = ("antagonist", "protagonist")
 COUNTS = ("bout", "attack_steps", "penalty_steps", "camping_steps")
 FEATURE_COLUMNS = tuple(f"{agent}_{feature.name}" for agent in AGENTS for feature in FEATURES)
 

@@ -3,7 +3,8 @@ import functools
 import numpy as np
 import pytest
 
-from services.actor.collector import Collector, Evaluation, Segment, staggered_starts
+from services.actor.collector import Collector, Segment, staggered_starts
+from services.actor.evaluation import Evaluation
 from shared.game.reward import RewardConfig
 from shared.game.rules import RuleBook
 from shared.policy.action import ActionConfig

@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from services.actor.collector import Evaluation
+from services.actor.evaluation import Evaluation
 from services.actor.service import UNPLAYABLE_SECONDS, Actor
 from services.learner.gate import Decision, check_contents
 from shared.game.reward import RewardConfig

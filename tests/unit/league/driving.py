@@ -118,6 +118,7 @@ def bout_results(
         "penalty_steps": np.ones(count, np.int32),
         "camping_steps": np.zeros(count, np.int32),
         "complete": np.full(count, complete),
+        "features": np.full((0 if lease.stage is not None else count, 2, 8), 0.1, np.float32),
     }
     return BoutResults(**(fields | changes))
 
