@@ -1,6 +1,7 @@
 """Who can play a side: snapshots and scripted players, behind one interface."""
 
-from typing import Protocol
+from collections.abc import Callable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,21 +9,51 @@ from numpy.typing import NDArray
 from shared.errors import SnapshotError
 from shared.messages.training import ACTION_DIM
 from shared.policy.mlp import GaussianPolicy
+from shared.policy.scripted.attack import Slash, Stab
+from shared.policy.scripted.guard import Guard
+from shared.policy.scripted.heuristic import Heuristic
+from shared.policy.scripted.person import ADAPTIVE, NOVICE, STEADY, Person
+from shared.policy.scripted.sight import Arena
 
 Floats = NDArray[np.float32]
 SCRIPTED_PREFIX = "scripted:"
+RETREAT_STEPS = 150
+"""Steps in the target after which ``heuristic-retreating`` draws back; camping is paid past 200."""
 
 
 class Player(Protocol):
     """Plays one side of N bouts."""
+
+    @property
+    def offset_scale(self) -> float:
+        """How many times wider than configured the bounds of its actions are."""
+        ...
 
     def act(self, obs: Floats, generator: np.random.Generator) -> Floats:
         """Return float32[N, 6], what to do on float32[N, 27]."""
         ...
 
 
+@runtime_checkable
+class RememberingPlayer(Player, Protocol):
+    """A player whose next action also depends on what it saw before.
+
+    It sees for itself where a bout is new: the game time in the observation went back.
+    """
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Return copies of all it remembers, from which ``restore`` continues bit for bit."""
+        ...
+
+    def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
+        """Continue from what ``state`` returned."""
+        ...
+
+
 class SnapshotPlayer:
     """A frozen policy."""
+
+    offset_scale = 1.0
 
     def __init__(self, policy: GaussianPolicy, stochastic: bool) -> None:
         self.policy = policy
@@ -39,16 +70,36 @@ class SnapshotPlayer:
 class StaticPlayer:
     """Asks for no offset: holds still."""
 
+    offset_scale = 1.0
+
     def act(self, obs: Floats, generator: np.random.Generator) -> Floats:
         """Return zeros."""
         return np.zeros((len(obs), ACTION_DIM), np.float32)
 
 
-SCRIPTED_PLAYERS: dict[str, type[StaticPlayer]] = {"static": StaticPlayer}
+SCRIPTED_PLAYERS: dict[str, Callable[[Arena], Player]] = {
+    "static": lambda arena: StaticPlayer(),
+    # Protagonists.
+    "heuristic": Heuristic,
+    "heuristic-printed": lambda arena: Heuristic(arena, projection="printed"),
+    "heuristic-retreating": lambda arena: Heuristic(arena, patience_steps=RETREAT_STEPS),
+    "guard": Guard,
+    # Antagonists.
+    "stab": Stab,
+    "slash": Slash,
+    "person-novice": lambda arena: Person(arena, NOVICE),
+    "person-steady": lambda arena: Person(arena, STEADY),
+    "person-adaptive": lambda arena: Person(arena, ADAPTIVE),
+}
+"""By name; docs/players.md describes them."""
 
 
-def scripted_player(reference: str) -> Player:
-    """Return the scripted player that a reference names.
+def scripted_player(reference: str, arena: Arena | None = None) -> Player:
+    """Return the scripted player that a reference names, with nothing in its memory.
+
+    Args:
+        reference: ``scripted:<name>``.
+        arena: the sizes of the game it plays; those of ``riposte train`` if None.
 
     Raises:
         SnapshotError: if there is none of that name.
@@ -57,4 +108,4 @@ def scripted_player(reference: str) -> Player:
     if not reference.startswith(SCRIPTED_PREFIX) or name not in SCRIPTED_PLAYERS:
         known = ", ".join(SCRIPTED_PREFIX + known for known in sorted(SCRIPTED_PLAYERS))
         raise SnapshotError(f"there is no player {reference!r}; scripted players: {known}")
-    return SCRIPTED_PLAYERS[name]()
+    return SCRIPTED_PLAYERS[name](arena or Arena())

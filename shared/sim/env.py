@@ -13,6 +13,7 @@ from shared.game.rules import RuleBook
 from shared.messages.training import ACTION_DIM
 from shared.policy.action import ActionConfig, bounded_offset, desired_pose
 from shared.policy.observation import BAT_DIM, ObservationEncoder
+from shared.policy.scripted.sight import Arena
 from shared.sim.batch import FencingBatch
 from shared.sim.model import FencingModel
 
@@ -66,6 +67,19 @@ class FencingEnv:
         self.unjudged = 0
         """Steps played and not judged yet."""
         self._commands = self.batch.ctrl.reshape(num_envs, 2, _POSE_DIM).transpose(1, 2, 0)
+        self.offset_scales = (1.0, 1.0)
+        """How many times wider than configured each side's bounds are (``Player.offset_scale``)."""
+
+    @property
+    def arena(self) -> Arena:
+        """Return what a scripted player has to know of these worlds."""
+        return Arena(
+            bat=self.scores.bat,
+            target_radius=self.scores.target.radius,
+            offset_bound_m=self._action.offset_bound_m,
+            offset_bound_rad=self._action.offset_bound_rad,
+            control_timestep=self.model.cfg.control_timestep,
+        )
 
     def observe(self, antagonist: Float32s, protagonist: Float32s) -> None:
         """Write what each side sees now.
@@ -124,6 +138,8 @@ class FencingEnv:
         actions[0] = antagonist.T
         actions[1] = protagonist.T
         offsets = bounded_offset(actions, self._action)
+        if self.offset_scales != (1.0, 1.0):
+            offsets *= np.array(self.offset_scales)[:, None, None]
         self._commands[:] = desired_pose(offsets, np.ascontiguousarray(self._tools))
 
     def reset(

@@ -32,7 +32,9 @@ class _Bouts:
         self.task = task
         self.side = SIDES.index(agent)
         self.env = task.worlds(num_envs, num_threads)
-        self.player = task.player(opponent, self.env.model.hash)
+        self.player = task.player(opponent, self.env)
+        scale = self.player.offset_scale
+        self.env.offset_scales = (1.0, scale) if self.side == 0 else (scale, 1.0)
         self._others = np.zeros((num_envs, OBS_DIM), np.float32)
         self._steps = 0
 

@@ -65,8 +65,8 @@ class Task(msgspec.Struct, frozen=True, kw_only=True):
         """Return the box of float32[6]: offset of the tool, in units of its bounds."""
         return _float32s(gymnasium.spaces.Box(-1.0, 1.0, (ACTION_DIM,), np.float32))
 
-    def player(self, opponent: Opponent, model_hash: str) -> Player:
-        """Return who an opponent is.
+    def player(self, opponent: Opponent, env: FencingEnv) -> Player:
+        """Return who an opponent in these worlds is.
 
         Raises:
             SnapshotError: if there is no such player, or its snapshot does not fit this game.
@@ -76,10 +76,10 @@ class Task(msgspec.Struct, frozen=True, kw_only=True):
                 snapshot = unpack(opponent.read_bytes())
             except OSError as error:
                 raise SnapshotError(f"cannot read {opponent}: {error.strerror}") from error
-            snapshot.check_fits(Fit.of(self.action, self.sim.control_timestep, model_hash))
+            snapshot.check_fits(Fit.of(self.action, self.sim.control_timestep, env.model.hash))
             return SnapshotPlayer(GaussianPolicy(snapshot.weights), stochastic=True)
         if isinstance(opponent, str):
-            return scripted_player(opponent)
+            return scripted_player(opponent, env.arena)
         return _Function(opponent) if callable(opponent) else opponent
 
 
@@ -96,6 +96,8 @@ def _float32s(box: gymnasium.spaces.Box[Any]) -> "gymnasium.Space[Float32s]":
 
 class _Function:
     """A function of observations as a player."""
+
+    offset_scale = 1.0
 
     def __init__(self, function: Callable[[Float32s], Float32s]) -> None:
         self._function = function

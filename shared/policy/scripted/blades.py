@@ -1,0 +1,87 @@
+"""Geometry of blades: directions that are perpendicular, turned, or tangent to the target.
+
+Pure functions of float64[3, N], component first.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.game.geometry import dot, length
+
+Floats = NDArray[np.float64]
+
+_TINY = 1e-9
+
+
+def cross(a: Floats, b: Floats) -> Floats:
+    """Return the vector products."""
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    out[0] = a[1] * b[2] - a[2] * b[1]
+    out[1] = a[2] * b[0] - a[0] * b[2]
+    out[2] = a[0] * b[1] - a[1] * b[0]
+    return out
+
+
+def unit(vectors: Floats) -> Floats:
+    """Return the vectors at length one; a vanishing one stays (nearly) zero."""
+    return vectors / np.maximum(length(vectors), _TINY)
+
+
+def across(vectors: Floats, axes: Floats, fallback: Floats) -> Floats:
+    """Return unit vectors perpendicular to axes, as near as possible to given vectors.
+
+    Args:
+        vectors: float64[3, N], what to be near to.
+        axes: float64[3, N], unit vectors.
+        fallback: float64[3] or [3, N], near to this where a vector is parallel to its axis.
+    """
+    rest = vectors - dot(vectors, axes) * axes
+    parallel = dot(rest, rest) < 1e-6
+    if parallel.any():
+        instead = np.broadcast_to(fallback.reshape(3, -1), rest.shape)
+        rest = np.where(parallel, instead - dot(instead, axes) * axes, rest)
+    return unit(rest)
+
+
+def turned(vectors: Floats, rotations: Floats) -> Floats:
+    """Return vectors turned by rotation vectors (axis times angle, rad; Rodrigues' formula)."""
+    angle = length(rotations)
+    axes = rotations / np.maximum(angle, _TINY)
+    cosine = np.cos(angle)
+    return (
+        cosine * vectors
+        + np.sin(angle) * cross(axes, vectors)
+        + ((1.0 - cosine) * dot(axes, vectors)) * axes
+    )
+
+
+def turn_between(start: Floats, end: Floats) -> Floats:
+    """Return float64[3, N], the shortest rotation vectors from unit vectors to unit vectors (rad).
+
+    Opposite vectors have no shortest one: any half turn is returned then.
+    """
+    axes = cross(start, end)
+    sine = length(axes)
+    angle = np.arctan2(sine, dot(start, end))
+    opposite = (sine < _TINY) & (angle > 1.0)
+    if opposite.any():
+        sideways = np.where(np.abs(start[0]) < 0.9, [[1.0], [0.0], [0.0]], [[0.0], [1.0], [0.0]])
+        axes = np.where(opposite, across(sideways, start, sideways), axes)
+        sine = np.where(opposite, 1.0, sine)
+    return axes * (angle / np.maximum(sine, _TINY))
+
+
+def tangent_back(points: Floats, radius: float, sideways: Floats) -> Floats:
+    """Return unit vectors from points along a line that touches a sphere around the origin.
+
+    Of all such lines the one is taken that passes the sphere on the side of ``sideways``.
+
+    Args:
+        points: float64[3, N], outside the sphere.
+        radius: of the sphere (m).
+        sideways: float64[3, N], unit vectors perpendicular to the points.
+    """
+    distance = length(points)
+    sine = np.minimum(radius / np.maximum(distance, _TINY), 1.0)
+    cosine = np.sqrt(1.0 - sine * sine)
+    return sine * sideways - cosine * (points / np.maximum(distance, _TINY))

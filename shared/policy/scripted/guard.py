@@ -1,0 +1,86 @@
+"""A guard that does not camp: its blade bars the way into the target from outside.
+
+It aims at the point where the opponent's blade enters (or would enter) a sphere somewhat wider
+than the target, and lays its own blade through that point along a line that touches, and does not
+cut, a sphere that is still wider than the target. So it meets the opponent's blade without being
+in the target itself.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.game.geometry import BatShape, length
+from shared.policy.scripted.blades import across, tangent_back, unit
+from shared.policy.scripted.memory import Arrays, Memory
+from shared.policy.scripted.retreat import HOME_GRIP, Retreat
+from shared.policy.scripted.sight import OTHER, OWN, Arena, Sight, nearest_to_centre
+from shared.policy.scripted.tracking import track
+
+Floats = NDArray[np.float64]
+Float32s = NDArray[np.float32]
+
+CLEARANCE = 0.05
+"""Between the target and the guard's blade at its nearest (m)."""
+MEETING = 0.15
+"""Between the target and the point where blades should meet (m)."""
+TIP = 0.06
+"""How far from its tip the guard's blade meets the other (m)."""
+PATIENCE_STEPS = 50
+"""Consecutive steps in the target after which it draws back, whatever it costs."""
+_RIGHT_AND_UP: Floats = np.array([0.0, -1.0, 0.5])
+
+
+def meeting_point(grips: Floats, blades: Floats, bat: BatShape, radius: float) -> Floats:
+    """Return where the opponents' blades come in through a sphere around the target.
+
+    A blade that does not reach the sphere is met on the sphere, where it is nearest to it.
+
+    Args:
+        grips: float64[3, N], the opponents' (m).
+        blades: float64[3, N], unit vectors.
+        bat: shape of the bats.
+        radius: of the sphere (m).
+    """
+    nearest = nearest_to_centre(grips, blades, bat)
+    distance = length(nearest)
+    # Towards the grip from the nearest point until the blade leaves the sphere.
+    back = np.sqrt(np.maximum(radius * radius - distance * distance, 0.0))
+    outside = unit(nearest) * radius
+    return np.where(distance < radius, nearest - back * blades, outside)
+
+
+class Guard:
+    """Bars the way from outside the target."""
+
+    offset_scale = 1.0
+
+    def __init__(self, arena: Arena) -> None:
+        self._arena = arena
+        self._memory = Memory()
+        self._retreat = Retreat(self._memory, arena, PATIENCE_STEPS)
+
+    def desired(self, sight: Sight) -> tuple[Floats, Floats]:
+        """Return where the grips (m) and unit vectors along the blades should be."""
+        arena = self._arena
+        radius = arena.reach_of_target
+        grips, blades = sight.grips[:, OTHER], sight.blades[:, OTHER]
+        points = meeting_point(grips, blades, arena.bat, radius + MEETING)
+        # Past the target on the side where the own hand is and has its home.
+        hand = sight.grips[:, OWN] + HOME_GRIP
+        back = tangent_back(points, radius + CLEARANCE, across(hand, unit(points), _RIGHT_AND_UP))
+        return points + (arena.bat.front - TIP) * back, -back
+
+    def act(self, obs: Float32s, generator: np.random.Generator) -> Float32s:
+        """Return float32[N, 6]."""
+        sight = Sight.of(obs)
+        is_new = self._memory.begin(sight.seconds)
+        wanted = self._retreat.apply(is_new, sight, *self.desired(sight))
+        return track(sight, *wanted, self._arena)
+
+    def state(self) -> Arrays:
+        """Return what ``restore`` continues from."""
+        return self._memory.state()
+
+    def restore(self, arrays: Arrays) -> None:
+        """Continue from what ``state`` returned."""
+        self._memory.restore(arrays)
