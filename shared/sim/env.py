@@ -24,7 +24,7 @@ Longs = NDArray[np.int64]
 _POSE_DIM = 7
 _VELOCITY = slice(7, 10)
 """Linear velocity, among a bat's sensors."""
-UNJUDGED_STEPS = 10
+UNJUDGED_STEPS = 20
 """Most steps that may wait to be judged: enough to spread the cost of asking, and their arrays
 stay in the cache."""
 START_NOISE_RAD = 0.1
