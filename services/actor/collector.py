@@ -12,7 +12,7 @@ from shared.game.reward import RewardConfig, reward
 from shared.messages.league import FEATURE_DIM
 from shared.messages.training import ACTION_DIM, AGENTS, OBS_DIM
 from shared.policy.mlp import GaussianPolicy
-from shared.policy.players import Player
+from shared.policy.players import Player, RememberingPlayer
 from shared.sim.env import UNJUDGED_STEPS, FencingEnv
 
 Float32s = NDArray[np.float32]
@@ -125,6 +125,8 @@ class Collector:
         self._bouts = np.arange(env.num_envs, dtype=np.int64)
         self._next_bout = env.num_envs
         self._complete = first == 0
+        scale = opponent.offset_scale
+        env.offset_scales = (1.0, scale) if side == 0 else (scale, 1.0)
         env.reset(self._bouts, self._generator, first)
 
     def collect(
@@ -209,6 +211,9 @@ class Collector:
         }
         for name, value in self._env.scores.state().items():
             arrays[f"scores.{name}"] = value
+        if isinstance(self._opponent, RememberingPlayer):
+            for name, value in self._opponent.state().items():
+                arrays[f"opponent.{name}"] = value
         values = {"next_bout": self._next_bout, "generator": self._generator.bit_generator.state}
         return arrays, values
 
@@ -217,8 +222,13 @@ class Collector:
         self._env.batch.restore(arrays["physics"])
         self._bouts[:] = arrays["bouts"]
         self._complete[:] = arrays["complete"]
-        self._env.scores.restore(
-            {k.removeprefix("scores."): v for k, v in arrays.items() if k.startswith("scores.")}
-        )
+        self._env.scores.restore(_of("scores.", arrays))
+        if isinstance(self._opponent, RememberingPlayer):
+            self._opponent.restore(_of("opponent.", arrays))
         self._next_bout = int(values["next_bout"])
         self._generator.bit_generator.state = values["generator"]
+
+
+def _of(prefix: str, arrays: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Return the arrays whose names begin so, without that beginning."""
+    return {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}

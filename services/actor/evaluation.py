@@ -38,6 +38,8 @@ class Evaluation:
         self._count = bouts
         self._meter = StyleMeter(env.num_envs, env.model.cfg.control_timestep)
         self.left = env.rules.bout_steps
+        antagonist, protagonist = players
+        env.offset_scales = (antagonist.offset_scale, protagonist.offset_scale)
         env.reset(self._numbers, self._generator)
 
     def advance(

@@ -8,6 +8,7 @@ from shared.messages.league import SnapshotReply, SnapshotRequest
 from shared.messages.topics import SNAPSHOT
 from shared.policy.mlp import GaussianPolicy
 from shared.policy.players import SCRIPTED_PREFIX, Player, SnapshotPlayer, scripted_player
+from shared.policy.scripted.sight import Arena
 from shared.policy.snapshot import Fit, digest_of, reference_of, unpack
 
 RETRY_DELAY = 0.5
@@ -17,19 +18,23 @@ RETRY_DELAY = 0.5
 class Opponents:
     """A bounded cache of frozen policies, filled from the league."""
 
-    def __init__(self, bus: Bus, clock: Clock, fit: Fit, capacity: int, timeout: float) -> None:
+    def __init__(
+        self, bus: Bus, clock: Clock, fit: Fit, arena: Arena, capacity: int, timeout: float
+    ) -> None:
         """Make an empty cache.
 
         Args:
             bus: where the league answers.
             clock: spaces the retries.
             fit: what a policy must be made for.
+            arena: what a scripted player has to know.
             capacity: policies kept; the least recently used one leaves.
             timeout: seconds to wait for the league's answer.
         """
         self._bus = bus
         self._clock = clock
         self._fit = fit
+        self._arena = arena
         self._capacity = capacity
         self._timeout = timeout
         self._policies: OrderedDict[str, GaussianPolicy] = OrderedDict()
@@ -49,7 +54,7 @@ class Opponents:
             SnapshotError: if the reference names nobody, or the policy does not fit.
         """
         if reference.startswith(SCRIPTED_PREFIX):
-            return scripted_player(reference)
+            return scripted_player(reference, self._arena)
         digest = digest_of(reference)
         if digest in self._policies:
             self._policies.move_to_end(digest)

@@ -72,7 +72,7 @@ class Actor:
         self._env = env
         self._bus = bus
         self._clock = clock
-        self._opponents = Opponents(bus, clock, fit, cfg.opponent_cache, cfg.ask_timeout)
+        self._opponents = Opponents(bus, clock, fit, env.arena, cfg.opponent_cache, cfg.ask_timeout)
         self._rollouts: dict[Agent, Outbox[Rollout, Receipt]] = {
             agent: Outbox(
                 bus, ROLLOUT, clock, window=1, timeout=cfg.acknowledge_timeout, agent=agent

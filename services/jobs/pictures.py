@@ -103,6 +103,8 @@ def play(
     """Return every tenth instant of one bout."""
     generator = np.random.default_rng(seed)
     env = FencingEnv(model, rules, action, 1)
+    antagonist, protagonist = players
+    env.offset_scales = (antagonist.offset_scale, protagonist.offset_scale)
     env.reset(np.arange(1), generator)
     seen = (np.empty((1, OBS_DIM), np.float32), np.empty((1, OBS_DIM), np.float32))
     moments: list[Moment] = []
