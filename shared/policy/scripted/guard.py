@@ -9,7 +9,7 @@ in the target itself.
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.game.geometry import BatShape, length
+from shared.game.geometry import BatShape, dot, length
 from shared.policy.scripted.blades import across, tangent_back, unit
 from shared.policy.scripted.memory import Arrays, Memory
 from shared.policy.scripted.retreat import HOME_GRIP, Retreat
@@ -44,7 +44,8 @@ def meeting_point(grips: Floats, blades: Floats, bat: BatShape, radius: float) -
     nearest = nearest_to_centre(grips, blades, bat)
     distance = length(nearest)
     # Towards the grip from the nearest point until the blade leaves the sphere.
-    back = np.sqrt(np.maximum(radius * radius - distance * distance, 0.0))
+    ahead = dot(nearest, blades)
+    back = ahead + np.sqrt(np.maximum(ahead * ahead + radius * radius - distance * distance, 0.0))
     outside = unit(nearest) * radius
     return np.where(distance < radius, nearest - back * blades, outside)
 

@@ -1,12 +1,12 @@
 """Simulated people as antagonists: late senses, smooth and noisy reaching, search, strategy.
 
 A person does not see the target: it knows about where it is, aims there, and moves its guess with
-the tones it hears. Each attack comes from one of a few directions; how the direction is chosen is
-what sets the three people apart. What is believed and preferred is kept from bout to bout.
+the tones it hears. Each attack comes from one of a few directions; a tactic says from which, and
+one of the three people learns from bout to bout which tactic pays. What is believed and preferred
+is kept from bout to bout.
 """
 
 import dataclasses
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,6 @@ from shared.policy.scripted.tracking import track
 
 Floats = NDArray[np.float64]
 Float32s = NDArray[np.float32]
-Choice = Literal["any", "clearest", "learned"]
 
 APPROACHES: Floats = unit(
     np.array(
@@ -35,7 +34,14 @@ APPROACHES: Floats = unit(
         ]
     ).T
 )
-"""Directions of the blade in an attack, one a column."""
+"""Directions of the blade in an attack, one a column; 0 to 5 are also the tactics of attacking
+from nowhere else."""
+CLEAREST = APPROACHES.shape[1]
+"""The tactic of attacking from where the way in is clearest of the other blade, as it is seen."""
+ANY = CLEAREST + 1
+"""The tactic of attacking from anywhere."""
+TACTICS = ANY + 1
+"""How many tactics there are."""
 DEPTH = 0.60
 """Of the blade, from the grip, that is aimed at the guess (m)."""
 READY_GRIP: Floats = np.array([[-0.62], [-0.25], [-0.15]])
@@ -57,15 +63,16 @@ _SURER, _LESS_SURE = 0.98, 1.3
 class Character:
     """What sets one person apart from another."""
 
-    choice: Choice
-    """How the direction of an attack is chosen: any; the one that is clearest of the other blade
-    as it is seen; or, for a whole bout, the one that has paid best so far."""
+    tactic: int | None
+    """What it does in every bout; None: what has paid best so far, by the score it heard."""
     sight_seconds: float
     """Delay of what is seen."""
     hearing_seconds: float
     """Delay of what is heard."""
     anticipation: float
     """Share of the delay of sight that is made up for by carrying on the motion seen."""
+    lead: float
+    """Seconds farther than that which it looks ahead."""
     peak_speed: float
     """Of the hand (m/s)."""
     noise: float
@@ -79,23 +86,23 @@ class Character:
 
 
 NOVICE = Character(
-    choice="any", sight_seconds=0.25, hearing_seconds=0.22, anticipation=0.0, peak_speed=1.2,
-    noise=0.20, spread=0.12, caution=0.0, pause=(0.5, 1.2),
+    tactic=ANY, sight_seconds=0.25, hearing_seconds=0.22, anticipation=0.0, lead=0.0,
+    peak_speed=1.2, noise=0.20, spread=0.12, caution=0.0, pause=(0.5, 1.2),
 )  # fmt: skip
 STEADY = Character(
-    choice="clearest", sight_seconds=0.22, hearing_seconds=0.19, anticipation=0.5, peak_speed=1.5,
-    noise=0.15, spread=0.08, caution=0.08, pause=(0.2, 0.6),
+    tactic=CLEAREST, sight_seconds=0.22, hearing_seconds=0.19, anticipation=0.5, lead=0.0,
+    peak_speed=1.5, noise=0.15, spread=0.08, caution=0.08, pause=(0.2, 0.6),
 )  # fmt: skip
 ADAPTIVE = Character(
-    choice="learned", sight_seconds=0.20, hearing_seconds=0.17, anticipation=1.0, peak_speed=1.8,
-    noise=0.10, spread=0.08, caution=0.12, pause=(0.1, 0.4),
+    tactic=None, sight_seconds=0.20, hearing_seconds=0.17, anticipation=1.0, lead=0.03,
+    peak_speed=1.8, noise=0.10, spread=0.08, caution=0.08, pause=(0.1, 0.4),
 )  # fmt: skip
 
 EXPLORATION = 0.1
-"""Chance that a learning person plays a bout from any direction (epsilon-greedy; Sutton & Barto
-2018, section 2.2)."""
+"""Chance that a learning person plays a bout by any tactic (epsilon-greedy; Sutton & Barto 2018,
+section 2.2)."""
 RECENCY = 0.3
-"""Share by which a bout's score replaces what a direction was worth (ibid., section 2.5)."""
+"""Share by which a bout's score replaces what a tactic was worth (ibid., section 2.5)."""
 
 
 class Person:
@@ -116,6 +123,7 @@ class Person:
             round(character.sight_seconds / arena.control_timestep),
             round(character.hearing_seconds / arena.control_timestep),
             character.anticipation,
+            character.lead,
         )
 
     def act(self, obs: Float32s, generator: np.random.Generator) -> Float32s:
@@ -144,27 +152,29 @@ class Person:
         memory["phase"] = np.zeros(count, np.int8)
         memory["until"] = np.zeros(count)
         memory["last_point"] = np.zeros(count)
-        memory["approach"] = np.full(count, -1)
+        memory["approach"] = np.zeros(count, np.int64)
+        memory["tactic"] = np.full(count, -1)
         memory["heard_score"] = np.zeros(count)
-        memory["worth"] = np.full((APPROACHES.shape[1], count), np.inf)
+        memory["worth"] = np.full((TACTICS, count), np.inf)
 
     def _begin_bout(self, where: Bools, sight: Sight, generator: np.random.Generator) -> None:
         """Draw the lesson of the bout before, choose anew, and get ready."""
         memory, now = self._memory, sight.seconds
         self._senses.begin(where, sight)
-        played = np.flatnonzero(where & (memory["approach"] >= 0))
-        approach, score = memory["approach"][played], memory["heard_score"][played]
-        before = memory["worth"][approach, played]
+        played = np.flatnonzero(where & (memory["tactic"] >= 0))
+        tactic, score = memory["tactic"][played], memory["heard_score"][played]
+        before = memory["worth"][tactic, played]
         first = np.isinf(before)
         before[first] = score[first]
-        memory["worth"][approach, played] = before + RECENCY * (score - before)
+        memory["worth"][tactic, played] = before + RECENCY * (score - before)
         memory["heard_score"][where] = 0.0
-        memory["approach"][where] = self._preferred(where, generator)
+        always = self._character.tactic
+        memory["tactic"][where] = self._preferred(where, generator) if always is None else always
         self._start(_READY, where, sight)
         memory["until"][where] = now[where] + self._pauses(where, generator)
 
     def _preferred(self, where: Bools, generator: np.random.Generator) -> NDArray[np.int64]:
-        """Return int64[K], for each of these worlds an untried approach, or the best one."""
+        """Return int64[K], for each of these worlds an untried tactic, or the best one."""
         worth = self._memory["worth"][:, where]
         order = generator.random(worth.shape)  # settles ties between the untried ones
         best: NDArray[np.int64] = np.lexsort((order, worth), axis=0)[-1]
@@ -176,14 +186,16 @@ class Person:
         memory = self._memory
         point, penalty = heard == SCORING, heard == PENALTY
         memory["heard_score"] += np.where(point, 1.0, np.where(penalty, -10.0, 0.0))
-        if point.any():
+        # What is heard on the way out belongs to where the blade was: no news of the target.
+        news = point & (memory["phase"] == _ATTACKING)
+        if news.any():
             grips, blades = sight.grips[:, OWN], sight.blades[:, OWN]
             guess, bat = memory["guess"], self._arena.bat
             along = np.clip(((guess - grips) * blades).sum(0), bat.back, bat.front)
             moved = guess + _LEARNING * (grips + along * blades - guess)
-            guess[:, point] = memory["known"][:, point] = moved[:, point]
-            memory["spread"][point] = np.maximum(memory["spread"][point] * _SURER, _CERTAIN)
-            memory["last_point"][point] = sight.seconds[point]
+            guess[:, news] = memory["known"][:, news] = moved[:, news]
+            memory["spread"][news] = np.maximum(memory["spread"][news] * _SURER, _CERTAIN)
+            memory["last_point"][news] = sight.seconds[news]
 
     def _decide(
         self,
@@ -231,15 +243,15 @@ class Person:
         self, where: Bools, grips: Floats, blades: Floats, generator: np.random.Generator
     ) -> None:
         """Choose the direction of the attack that begins in these worlds."""
-        count = int(np.count_nonzero(where))
-        if self._character.choice == "any":
-            self._memory["approach"][where] = generator.integers(APPROACHES.shape[1], size=count)
-        elif self._character.choice == "clearest":
-            aims = self._memory["guess"][:, None, where]
-            ways = np.repeat(APPROACHES[:, :, None], count, axis=2)
-            other, blade = grips[:, None, where], blades[:, None, where]
-            clear = distance_between_bats(aims - DEPTH * ways, ways, other, blade, self._arena.bat)
-            self._memory["approach"][where] = clear.argmax(axis=0)
+        memory, places = self._memory, np.flatnonzero(where)
+        tactic, kinds = memory["tactic"][places], APPROACHES.shape[1]
+        ways = np.repeat(APPROACHES[:, :, None], len(places), axis=2)
+        hands = memory["guess"][:, None, places] - DEPTH * ways
+        other, blade = grips[:, None, places], blades[:, None, places]
+        clear = distance_between_bats(hands, ways, other, blade, self._arena.bat).argmax(axis=0)
+        drawn = generator.integers(kinds, size=len(places))
+        chosen = np.where(tactic == CLEAREST, clear, np.where(tactic == ANY, drawn, tactic))
+        memory["approach"][places] = chosen
 
     def _start(self, phase: int, where: Bools, sight: Sight) -> None:
         """Begin to move: into the attack, or to where the bat waits."""

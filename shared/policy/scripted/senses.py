@@ -42,6 +42,8 @@ class Senses:
     """Control steps by which a tone is heard late."""
     anticipation: float
     """Share of the delay that is made up for by carrying on the motion that was seen."""
+    lead: float
+    """Seconds farther that the motion is carried on."""
 
     def allocate(self, count: int) -> None:
         """Make room for N worlds."""
@@ -58,8 +60,8 @@ class Senses:
         """Take in what is there now; return what gets through now.
 
         Returns:
-            float64[3, N] the other grips and float64[3, N] the other blades, as they are believed
-            to be now, and int8[N] the tones.
+            float64[3, N] the other grips and float64[3, N] the other blades, as they are expected
+            to be, and int8[N] the tones.
         """
         seen, heard, step = self.memory["seen"], self.memory["heard"], self.memory["step"]
         now = int(step[0])
@@ -67,7 +69,8 @@ class Senses:
         heard[now % len(heard)] = tones(sight, self.arena)
         step += 1
         late = seen[(now + 1) % len(seen)]
-        ahead = self.anticipation * self.sight_steps * self.arena.control_timestep
+        delay = self.sight_steps * self.arena.control_timestep
+        ahead = self.anticipation * delay + self.lead
         grips = late[0:3] + ahead * late[6:9]
         blades = turned(late[3:6], ahead * late[9:12])
         return grips, blades, heard[(now + 1) % len(heard)].copy()
