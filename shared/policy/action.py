@@ -75,8 +75,8 @@ def desired_pose(offsets: Floats, tools: Floats) -> Floats:
         float64[..., 7, N]; the quaternions are longer than one by 1 / cos(angle / 2).
     """
     out = tools.copy()
+    products = out.take(_FACTORS, axis=-2)
     out[..., :3, :] += offsets[..., :3, :]
-    products = tools.take(_FACTORS, axis=-2)
     products *= _SIGNS
     products *= offsets[..., 3:, None, :]
     out[..., 3:, :] += np.add.reduce(products, axis=-3)

@@ -140,7 +140,7 @@ class FencingEnv:
         offsets = bounded_offset(actions, self._action)
         if self.offset_scales != (1.0, 1.0):
             offsets *= np.array(self.offset_scales)[:, None, None]
-        self._commands[:] = desired_pose(offsets, np.ascontiguousarray(self._tools))
+        self._commands[:] = desired_pose(offsets, self._tools)
 
     def reset(
         self, bouts: Longs, generator: np.random.Generator, first_step: NDArray[np.int32] | int = 0
