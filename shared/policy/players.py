@@ -17,7 +17,7 @@ from shared.policy.scripted.sight import Arena
 
 Floats = NDArray[np.float32]
 SCRIPTED_PREFIX = "scripted:"
-RETREAT_STEPS = 150
+RETREAT_STEPS = 100
 """Steps in the target after which ``heuristic-retreating`` draws back; camping is paid past 200."""
 
 

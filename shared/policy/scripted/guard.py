@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from shared.game.geometry import BatShape, dot, length
 from shared.policy.scripted.blades import across, tangent_back, unit
 from shared.policy.scripted.memory import Arrays, Memory
-from shared.policy.scripted.retreat import HOME_GRIP, Retreat
+from shared.policy.scripted.retreat import Retreat
 from shared.policy.scripted.sight import OTHER, OWN, Arena, Sight, nearest_to_centre
 from shared.policy.scripted.tracking import track
 
@@ -27,6 +27,8 @@ TIP = 0.06
 """How far from its tip the guard's blade meets the other (m)."""
 PATIENCE_STEPS = 50
 """Consecutive steps in the target after which it draws back, whatever it costs."""
+HOME: Floats = np.array([[-0.45], [-0.25], [-0.10]])
+"""Where the hand is en garde (m)."""
 _RIGHT_AND_UP: Floats = np.array([0.0, -1.0, 0.5])
 
 
@@ -67,7 +69,7 @@ class Guard:
         grips, blades = sight.grips[:, OTHER], sight.blades[:, OTHER]
         points = meeting_point(grips, blades, arena.bat, radius + MEETING)
         # Past the target on the side where the own hand is and has its home.
-        hand = sight.grips[:, OWN] + HOME_GRIP
+        hand = sight.grips[:, OWN] + HOME
         back = tangent_back(points, radius + CLEARANCE, across(hand, unit(points), _RIGHT_AND_UP))
         return points + (arena.bat.front - TIP) * back, -back
 

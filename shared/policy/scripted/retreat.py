@@ -5,13 +5,24 @@ from numpy.typing import NDArray
 
 from shared.policy.scripted.blades import unit
 from shared.policy.scripted.memory import Bools, Memory
-from shared.policy.scripted.sight import OWN, Arena, Sight, is_in_target
+from shared.policy.scripted.sight import OWN, Arena, Sight, is_in_target, nearest_to_centre
 
 Floats = NDArray[np.float64]
 
-HOME_GRIP: Floats = np.array([[-0.45], [-0.25], [-0.10]])
-HOME_BLADE: Floats = unit(np.array([[0.25], [0.0], [0.97]]))
-"""Where the bat is drawn back to: en garde, blade up, clear of the target (m)."""
+STRIDE = 0.3
+"""How far off the pose is that the bat is drawn back to (m)."""
+_BACK = 0.05
+"""Draws the way out towards the own side (m)."""
+
+
+def way_out(sight: Sight, arena: Arena) -> Floats:
+    """Return float64[3, N], unit vectors along which the own bat leaves the target.
+
+    Out through the nearest side, though never forwards, where the arm's reach ends.
+    """
+    outward = nearest_to_centre(sight.grips[:, OWN], sight.blades[:, OWN], arena.bat)
+    outward[0] = np.minimum(outward[0], 0.0) - _BACK
+    return unit(outward)
 
 
 class Retreat:
@@ -33,7 +44,7 @@ class Retreat:
     def apply(
         self, is_new: Bools | None, sight: Sight, grips: Floats, blades: Floats
     ) -> tuple[Floats, Floats]:
-        """Return the poses to track: those wanted, or home where it is time to leave.
+        """Return the poses to track: those wanted, or the way out where it is time to leave.
 
         Args:
             is_new: what ``Memory.begin`` returned.
@@ -52,4 +63,5 @@ class Retreat:
         self._memory["inside"], self._memory["leaving"] = inside, leaving
         if not leaving.any():
             return grips, blades
-        return np.where(leaving, HOME_GRIP, grips), np.where(leaving, HOME_BLADE, blades)
+        out = sight.grips[:, OWN] + STRIDE * way_out(sight, self._arena)
+        return np.where(leaving, out, grips), np.where(leaving, sight.blades[:, OWN], blades)
