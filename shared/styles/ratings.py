@@ -171,8 +171,8 @@ def refit(strengths: Floats, total: Floats, shares: Floats, played: NDArray[np.b
     for _ in range(NEWTON_STEPS):
         expected: Floats = 1.0 / (1.0 + np.exp(-(found @ design.T)))
         slope: Floats = (weights * (expected - won)) @ design + ridge * found
-        curvature = weights * expected * (1.0 - expected)
-        hessian = np.einsum("dk,ki,kj->dij", curvature, design, design, optimize=True)
+        curvature: Floats = weights * expected * (1.0 - expected)
+        hessian: Floats = (curvature[:, None, :] * design.T) @ design
         hessian += np.diag(ridge)
         step: Floats = np.linalg.solve(hessian, slope[:, :, None])[:, :, 0]
         longest: Floats = np.abs(step).max(axis=1, keepdims=True)
