@@ -17,6 +17,17 @@ from shared.messages.league import (
 )
 from shared.messages.live import BoutFrames, Progress, ServiceStatus
 from shared.messages.message import Message
+from shared.messages.play import (
+    BatStates,
+    DesiredOffset,
+    GateReply,
+    GateRequest,
+    GateState,
+    HeartRate,
+    PlayReply,
+    PlayRequest,
+    RefereeState,
+)
 from shared.messages.training import (
     PolicyAnnouncement,
     Receipt,
@@ -122,6 +133,34 @@ FRAMES = Topic(
     "actor/{name}/frames", BoutFrames, Qos.STREAM, 8 * MIB, "actor", "recorder",
     "a sampled bout to look at",
 )
+BATS = Topic(
+    "play/bats", BatStates, Qos.STREAM, 4 * KIB, "robot_io", "policy, referee, recorder",
+    "both bats, 100 a second",
+)
+OFFSET = Topic(
+    "play/{agent}/offset", DesiredOffset, Qos.STREAM, 4 * KIB, "policy", "robot_io, recorder",
+    "where the tool should go from here",
+)
+REFEREE = Topic(
+    "play/referee", RefereeState, Qos.LATEST, 4 * KIB, "referee", "robot_io, recorder, play",
+    "phase, score and tone of the bout",
+)
+GATE = Topic(
+    "play/gate", GateState, Qos.LATEST, 4 * KIB, "robot_io", "play, recorder, status",
+    "mode of the safety gate and what it sent",
+)
+HEART_RATE = Topic(
+    "play/heart_rate", HeartRate, Qos.STREAM, 4 * KIB, "robot_io", "recorder, play",
+    "of the person who plays",
+)
+BOUT = Service(
+    "play/bout", PlayRequest, PlayReply, 4 * KIB, 4 * KIB, "play", "referee",
+    "starts, pauses and ends a bout",
+)
+ARM = Service(
+    "play/arm", GateRequest, GateReply, 4 * KIB, 16 * KIB, "play", "robot_io",
+    "a person arms or disarms the robot",
+)
 
 # fmt: on
 
@@ -133,5 +172,9 @@ SERVICES: tuple[Service[Any, Any], ...] = (
     LEASE,
     RENEWAL,
     SNAPSHOT,
+    BOUT,
+    ARM,
 )
-TOPICS: tuple[Topic[Any], ...] = (POLICY, SCHEDULE, PROGRESS, STATUS, FRAMES)
+TOPICS: tuple[Topic[Any], ...] = (
+    POLICY, SCHEDULE, PROGRESS, STATUS, FRAMES, BATS, OFFSET, REFEREE, GATE, HEART_RATE,
+)  # fmt: skip
