@@ -11,15 +11,13 @@ from shared.game.geometry import dot, length
 Floats = NDArray[np.float64]
 
 _TINY = 1e-9
+_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+"""The components after each, and before it, in turn."""
 
 
 def cross(a: Floats, b: Floats) -> Floats:
     """Return the vector products."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
-    return out
+    return a.take(_NEXT, 0) * b.take(_LAST, 0) - a.take(_LAST, 0) * b.take(_NEXT, 0)
 
 
 def unit(vectors: Floats) -> Floats:
@@ -69,6 +67,15 @@ def turn_between(start: Floats, end: Floats) -> Floats:
         axes = np.where(opposite, across(sideways, start, sideways), axes)
         sine = np.where(opposite, 1.0, sine)
     return axes * (angle / np.maximum(sine, _TINY))
+
+
+def gibbs_between(start: Floats, end: Floats) -> Floats:
+    """Return float64[3, N], twice the Gibbs vectors of the shortest turns between unit vectors.
+
+    That is the axis times 2 tan(angle / 2): what an action says. Nothing for opposite vectors,
+    which have no shortest turn.
+    """
+    return cross(start, end) * (2.0 / np.maximum(1.0 + dot(start, end), 1e-6))
 
 
 def tangent_back(points: Floats, radius: float, sideways: Floats) -> Floats:

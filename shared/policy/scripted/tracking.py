@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.messages.training import ACTION_DIM
-from shared.policy.scripted.blades import turn_between
+from shared.policy.scripted.blades import gibbs_between
 from shared.policy.scripted.sight import OWN, Arena, Sight
 
 Floats = NDArray[np.float64]
@@ -42,6 +42,6 @@ def track(
     out = np.empty((ACTION_DIM, sight.grips.shape[-1]))
     reach = grips - sight.grips[:, OWN] - damping * sight.velocities[:, OWN]
     np.divide(reach, arena.offset_bound_m, out=out[:3])
-    turn = turn_between(sight.blades[:, OWN], blades) - damping * sight.turning[:, OWN]
+    turn = gibbs_between(sight.blades[:, OWN], blades) - damping * sight.turning[:, OWN]
     np.divide(turn, arena.offset_bound_rad, out=out[3:])
     return out.T.astype(np.float32)

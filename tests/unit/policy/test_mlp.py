@@ -81,5 +81,5 @@ def test_the_static_player_asks_for_nothing():
 
 @pytest.mark.parametrize("reference", ["scripted:", "scripted:ghost", "static", ""])
 def test_a_scripted_player_that_is_none_is_refused_with_those_there_are(reference: str):
-    with pytest.raises(SnapshotError, match="scripted players: scripted:guard, .*scripted:static"):
+    with pytest.raises(SnapshotError, match=r"scripted players: scripted:guard, .*scripted:static"):
         scripted_player(reference)
