@@ -17,6 +17,8 @@ import numpy as np
 
 from services.jobs.pictures import Picture, bout_pictures
 from services.jobs.report_page import Extras, report_page
+from services.jobs.reproduction import HTML, JSON
+from services.jobs.reproduction import write as write_reproduction
 from services.jobs.settings import Settings
 from services.jobs.summary import Facts, Origin, Summary, summarise
 from services.jobs.words import summary_text
@@ -39,6 +41,8 @@ SMOOTH = 5
 FILES = {
     "report.html": "this page",
     "summary.json": "its numbers, for programs",
+    HTML: "what matches the paper and what does not, over both phases",
+    JSON: "its numbers, for programs",
     "league.sqlite": "the ledger: every version, bout, lease and incident",
     "snapshots": "every policy version, named by its hash",
     "learner": "checkpoints, to continue from",
@@ -72,6 +76,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def write_report(folder: Path, *, pictures: bool = True, command: str = "") -> Summary:
     """Write ``report.html`` and ``summary.json`` of a run and return its summary.
 
+    A run with rounds of phase two gets ``reproduction.html`` and ``reproduction.json``, too.
+
     Args:
         folder: of the run.
         pictures: play a bout with the last policies and show moments of it.
@@ -87,6 +93,7 @@ def write_report(folder: Path, *, pictures: bool = True, command: str = "") -> S
     site = folder / "config.toml"
     settings = Settings.load(site if site.exists() else None)
     summary = summarise(state, _facts(folder, state, settings, command))
+    write_reproduction(folder, summary, settings.to_toml())
     extras = Extras(
         pictures=_pictures(folder, state, settings) if pictures else (),
         panels=panels(state),
