@@ -16,6 +16,7 @@ ROUNDS = 6
 BOUTS = 600
 """Of each protagonist: 100 against each of six antagonists."""
 SELECTED = 3
+COMPONENTS = 3
 INFORMATION = 0.98
 ACCURACY = 0.9
 SIGNIFICANCE = 0.01
@@ -142,7 +143,10 @@ def _results(found: Reproduction) -> list[Claim]:
             f"({1 - styles.information_of_bouts:.0%} of what tells single bouts apart)"
         )
         names = ", ".join(styles.selected)
-        enough = styles.information >= INFORMATION
+        if styles.policies > COMPONENTS + 1:
+            enough = styles.information >= INFORMATION
+        else:
+            lost += f"; {styles.policies} policies always fit into {styles.policies - 1} components"
     return [
         _paper(
             "information lost at three components", "less than 2 %",

@@ -193,7 +193,7 @@ def _tournament(tournament: Tournament | None) -> Node:
             "p",
             f"{tournament.bouts:,} bouts; {percent_text(tournament.camping_share)} of all points "
             "given and taken came from camping. ",
-            "More in tournament/tournament.html.",
+            _more("tournament/tournament.html"),
         ),
         _heat(tournament, words),
         tag("h3", "Against scripted and simulated people"),
@@ -301,7 +301,11 @@ def _styles(styles: Styles | None) -> Node:
         ("effective number of styles", f"{_number(styles.effective_styles)} of {styles.policies}"),
     ]
     why = tag("p", styles.why_not) if styles.why_not else None
-    return [html.table(("", ""), rows), why, tag("p", "More in styles/styles.html.")]
+    return [html.table(("", ""), rows), why, tag("p", _more("styles/styles.html"))]
+
+
+def _more(path: str) -> Node:
+    return ["More in ", tag("a", path, href=path), "."]
 
 
 def _number(score: Score) -> str:

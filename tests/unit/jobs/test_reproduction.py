@@ -161,7 +161,7 @@ def test_styles_and_best_responses_are_taken_over(found: Reproduction) -> None:
     assert found.styles is not None
     assert found.styles.policies == ROUNDS
     assert found.styles.accuracy.mean > 0.9
-    assert claim(found, "information lost").holds is True
+    assert claim(found, "information lost").holds is None  # three policies lose nothing
     by_name = {one.name: one for one in found.exploitability}
     assert by_name["warm start"].samples == 500_000
     assert by_name["warm start"].score.mean == 910.0
