@@ -24,6 +24,7 @@ JOBS = (
     Command("report", "services.jobs.report", "write a run's HTML report"),
     Command("bench", "services.jobs.bench", "measure against the limit, in one run"),
     Command("doctor", "services.jobs.doctor", "check this machine and say what to do"),
+    Command("styles", "services.jobs.styles", "how protagonists move, and the three to send"),
     Command("export", "services.jobs.export", "a trained policy as ONNX, for other runtimes"),
     Command("sim", "services.jobs.sim", "export the two-robot model as MJCF"),
     Command("up", "services.jobs.up", "start and keep alive the processes a site file lists"),
