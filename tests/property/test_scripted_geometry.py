@@ -135,9 +135,10 @@ def test_both_shares_by_hand_for_a_bat_that_lies_on_the_x_axis():
 @given(SEEDS, st.floats(0.1, 0.4))
 def test_a_tangent_touches_the_sphere_and_does_not_cut_it(seed: int, radius: float):
     generator = np.random.default_rng(seed)
-    points = directions(generator, 16) * generator.uniform(1.01, 3.0, 16) * radius
-    sideways = across(directions(generator, 16), unit(points), UP)
-    back = tangent_back(points, radius, sideways)
+    outward, distance = directions(generator, 16), radius * generator.uniform(1.01, 3.0)
+    points = distance * outward
+    sideways = across(directions(generator, 16), outward, UP)
+    back = tangent_back(outward, distance, radius, sideways)
     np.testing.assert_allclose(np.linalg.norm(back, axis=0), 1.0, atol=1e-9)
     along = -(points * back).sum(0)
     np.testing.assert_allclose(np.linalg.norm(points + along * back, axis=0), radius, atol=1e-9)

@@ -20,7 +20,7 @@ STABS: Floats = unit(
     np.array([[0.80, 0.00, 0.60], [0.75, 0.50, 0.43], [0.75, 0.66, 0.00], [0.85, -0.20, 0.48]]).T
 )
 """Directions of the blade in a stab, one a column: from below, from below right, from the right,
-from below left. All are within the right arm's reach; a left arm's are mirrored in y."""
+from below left; all within reach of the right arm, the default one."""
 DEPTH = 0.62
 """Of the blade, from the grip, that points at the target's centre in a stab (m)."""
 DRAWN_BACK = 0.35

@@ -78,17 +78,16 @@ def gibbs_between(start: Floats, end: Floats) -> Floats:
     return cross(start, end) * (2.0 / np.maximum(1.0 + dot(start, end), 1e-6))
 
 
-def tangent_back(points: Floats, radius: float, sideways: Floats) -> Floats:
+def tangent_back(outward: Floats, distance: float, radius: float, sideways: Floats) -> Floats:
     """Return unit vectors from points along a line that touches a sphere around the origin.
 
     Of all such lines the one is taken that passes the sphere on the side of ``sideways``.
 
     Args:
-        points: float64[3, N], outside the sphere.
+        outward: float64[3, N], unit vectors from the origin to the points.
+        distance: of the points from the origin (m), at least ``radius``.
         radius: of the sphere (m).
-        sideways: float64[3, N], unit vectors perpendicular to the points.
+        sideways: float64[3, N], unit vectors perpendicular to ``outward``.
     """
-    distance = length(points)
-    sine = np.minimum(radius / np.maximum(distance, _TINY), 1.0)
-    cosine = np.sqrt(1.0 - sine * sine)
-    return sine * sideways - cosine * (points / np.maximum(distance, _TINY))
+    sine = radius / distance
+    return sine * sideways - np.sqrt(1.0 - sine * sine) * outward

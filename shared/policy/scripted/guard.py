@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.game.geometry import BatShape, dot, length
-from shared.policy.scripted.blades import across, tangent_back, unit
+from shared.policy.scripted.blades import across, tangent_back
 from shared.policy.scripted.memory import Arrays, Memory
 from shared.policy.scripted.retreat import Retreat
 from shared.policy.scripted.sight import OTHER, OWN, Arena, Sight, nearest_to_centre
@@ -29,6 +29,7 @@ PATIENCE_STEPS = 50
 """Consecutive steps in the target after which it draws back, whatever it costs."""
 HOME: Floats = np.array([[-0.45], [-0.25], [-0.10]])
 """Where the hand is en garde (m)."""
+_TINY = 1e-9
 _RIGHT_AND_UP: Floats = np.array([0.0, -1.0, 0.5])
 
 
@@ -48,7 +49,7 @@ def meeting_point(grips: Floats, blades: Floats, bat: BatShape, radius: float) -
     # Towards the grip from the nearest point until the blade leaves the sphere.
     ahead = dot(nearest, blades)
     back = ahead + np.sqrt(np.maximum(ahead * ahead + radius * radius - distance * distance, 0.0))
-    outside = unit(nearest) * radius
+    outside = nearest * (radius / np.maximum(distance, _TINY))
     return np.where(distance < radius, nearest - back * blades, outside)
 
 
@@ -65,12 +66,12 @@ class Guard:
     def desired(self, sight: Sight) -> tuple[Floats, Floats]:
         """Return where the grips (m) and unit vectors along the blades should be."""
         arena = self._arena
-        radius = arena.reach_of_target
-        grips, blades = sight.grips[:, OTHER], sight.blades[:, OTHER]
-        points = meeting_point(grips, blades, arena.bat, radius + MEETING)
+        near, far = arena.reach_of_target + CLEARANCE, arena.reach_of_target + MEETING
+        points = meeting_point(sight.grips[:, OTHER], sight.blades[:, OTHER], arena.bat, far)
+        outward = points / far
         # Past the target on the side where the own hand is and has its home.
-        hand = sight.grips[:, OWN] + HOME
-        back = tangent_back(points, radius + CLEARANCE, across(hand, unit(points), _RIGHT_AND_UP))
+        sideways = across(sight.grips[:, OWN] + HOME, outward, _RIGHT_AND_UP)
+        back = tangent_back(outward, far, near, sideways)
         return points + (arena.bat.front - TIP) * back, -back
 
     def act(self, obs: Float32s, generator: np.random.Generator) -> Float32s:
