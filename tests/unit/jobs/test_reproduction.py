@@ -7,8 +7,12 @@ import pytest
 from services.jobs import styles_summary
 from services.jobs.draws import Draw, fit_of, replay
 from services.jobs.report import write_report
+from services.jobs.reproduction import gather
 from services.jobs.reproduction_parts import Claim, Reproduction
+from services.jobs.summary import Facts, Origin, summarise
+from services.league.history import RunState
 from services.league.ledger import open_read_only
+from shared.game.rules import RuleBook
 from shared.styles.bouts import save
 from tests.unit.jobs.ledgers import finished_run
 from tests.unit.jobs.two_phases import (
@@ -25,6 +29,17 @@ from tests.unit.jobs.two_phases import (
 def report(folder: Path) -> Reproduction:
     write_report(folder, pictures=False)
     return msgspec.json.decode((folder / "reproduction.json").read_bytes(), type=Reproduction)
+
+
+def gathered(folder: Path) -> Reproduction:
+    """Return the numbers without drawing a page."""
+    with open_read_only(folder / "league.sqlite") as ledger:
+        state = RunState.fold(ledger.replay())
+    origin = Origin(command="", commit="", packages={}, python="", machine="")
+    facts = Facts(
+        folder=str(folder), started_at="", rules=RuleBook(), control_timestep=0.01, origin=origin
+    )
+    return gather(folder, summarise(state, facts))
 
 
 def claim(found: Reproduction, about: str) -> Claim:
@@ -75,7 +90,7 @@ def test_the_shape_of_the_learning_curve_is_judged_from_its_numbers(found: Repro
 def test_a_round_that_one_side_dominates_is_said_not_to_match(tmp_path: Path) -> None:
     played_run(tmp_path, swing=4000.0, rounds=1)
 
-    assert claim(report(tmp_path), "phase two").holds is False
+    assert claim(gathered(tmp_path), "phase two").holds is False
 
 
 def test_draws_of_the_sampler_replay_from_the_ledger_and_fit_it(found: Reproduction) -> None:
@@ -124,7 +139,7 @@ def test_the_test_of_draws_rejects_fair_ones_as_often_as_it_says() -> None:
 
 def test_another_sampler_than_the_papers_does_not_match(tmp_path: Path) -> None:
     played_run(tmp_path, sampler="pfsp", rounds=1)
-    found = report(tmp_path)
+    found = gathered(tmp_path)
 
     assert claim(found, "opponents of phase two").holds is False
     assert found.draws[0].replayed == found.draws[0].draws
@@ -195,7 +210,7 @@ def test_damaged_parts_are_named_and_do_not_stop_the_report(tmp_path: Path) -> N
     for name in ("tournament/bouts.parquet", "styles/styles.json", "exploitability/x.json"):
         (tmp_path / name).parent.mkdir()
         (tmp_path / name).write_bytes(b"{]")
-    found = report(tmp_path)
+    found = gathered(tmp_path)
 
     assert [bool(one.reason) for one in found.missing] == [True] * 3
 

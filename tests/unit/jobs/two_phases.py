@@ -21,7 +21,7 @@ from services.league.sampling import Sampler
 from shared.game.rules import RuleBook
 from shared.messages.training import AGENTS, Agent, UpdateMetrics
 from shared.styles.bouts import BoutTable, Provenance
-from tests.unit.jobs.ledgers import MODEL, SAMPLES, Script, digest
+from tests.unit.jobs.ledgers import MODEL, SAMPLES, SECOND, Script, digest
 
 ROUNDS = 3
 ITERATIONS = 8
@@ -34,17 +34,22 @@ MEANS = {"scripted:static": 1500.0, "scripted:heuristic": 300.0}
 
 
 class TwoPhases(Script):
-    """Makes events, and keeps the state they make."""
+    """Makes events, and keeps the state they make; writes them a stage at a time."""
 
     def __init__(self, path: Path, config: LeagueConfig) -> None:
         super().__init__(path)
         self.config = config
         self.state = RunState()
+        self.unwritten: list[Event] = []
 
     def add(self, *events: Event, seconds: float = 1.0) -> None:
-        super().add(*events, seconds=seconds)
+        self.at += round(seconds * SECOND)
         for event in events:
             self.state.apply(Entry(seq=self.state.position + 1, at_ns=self.at, event=event))
+        self.unwritten += events
+        if isinstance(events[-1], StageStarted | StageEnded | RunFinished):
+            self.ledger.append(self.unwritten, self.at)
+            self.unwritten = []
 
     def start(self) -> None:
         self.add(RunStarted(run="both", seed=self.config.seed, serial=False, config=self.config))
