@@ -19,6 +19,8 @@ class Command(NamedTuple):
 
 JOBS = (
     Command("train", "services.jobs.train", "train two fencers on this machine, with a report"),
+    Command("tournament", "services.jobs.tournament", "everybody of a run against everybody"),
+    Command("ratings", "services.jobs.ratings", "rate the players of a run's tournament"),
     Command("status", "services.jobs.status", "who runs, and who waits for whom"),
     Command("watch", "services.jobs.watch", "look at a run while it goes"),
     Command("report", "services.jobs.report", "write a run's HTML report"),
@@ -35,6 +37,8 @@ SERVICES = (
     Command("learner", "services.learner.__main__", "one agent's PPO"),
     Command("actor", "services.actor.__main__", "plays bouts in simulation"),
     Command("recorder", "services.recorder.__main__", "writes and shows what happens"),
+    Command("policy", "services.policy.__main__", "plays one side of a live bout"),
+    Command("referee", "services.referee.__main__", "scores a live bout"),
 )
 COMMANDS = {command.name: command for command in (*JOBS, *SERVICES)}
 

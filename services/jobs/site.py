@@ -28,6 +28,8 @@ DECLARED = {
     "learner": "services.learner.config:LearnerConfig",
     "actor": "services.actor.config:ActorConfig",
     "recorder": "services.recorder.config:RecorderConfig",
+    "policy": "services.policy.config:PolicyConfig",
+    "referee": "services.referee.config:RefereeConfig",
     "train": "services.jobs.settings:TrainConfig",
     "site": "services.jobs.up:SiteConfig",
 }

@@ -66,6 +66,22 @@ class PlayReply(Message, frozen=True, kw_only=True):
     reason: str = ""
 
 
+class PlayerRequest(Message, frozen=True, kw_only=True):
+    """Asks a policy to play as another player; only between bouts."""
+
+    player: str
+    """``scripted:NAME``, the file of a snapshot, ``RUN:AGENT`` or ``sha256:HASH``."""
+
+
+class PlayerReply(Message, frozen=True, kw_only=True):
+    """Whether the change happened, and why not."""
+
+    accepted: bool
+    player: str
+    """Who plays now: ``scripted:NAME`` or ``sha256:HASH``."""
+    reason: str = ""
+
+
 class RefereeState(Message, frozen=True, kw_only=True):
     """Where the bout stands; every tick while one runs."""
 

@@ -24,6 +24,8 @@ from shared.messages.play import (
     GateRequest,
     GateState,
     HeartRate,
+    PlayerReply,
+    PlayerRequest,
     PlayReply,
     PlayRequest,
     RefereeState,
@@ -157,6 +159,10 @@ BOUT = Service(
     "play/bout", PlayRequest, PlayReply, 4 * KIB, 4 * KIB, "play", "referee",
     "starts, pauses and ends a bout",
 )
+PLAYER = Service(
+    "play/{agent}/player", PlayerRequest, PlayerReply, 4 * KIB, 4 * KIB, "play", "policy",
+    "who plays a side from the next bout on",
+)
 ARM = Service(
     "play/arm", GateRequest, GateReply, 4 * KIB, 16 * KIB, "play", "robot_io",
     "a person arms or disarms the robot",
@@ -173,6 +179,7 @@ SERVICES: tuple[Service[Any, Any], ...] = (
     RENEWAL,
     SNAPSHOT,
     BOUT,
+    PLAYER,
     ARM,
 )
 TOPICS: tuple[Topic[Any], ...] = (

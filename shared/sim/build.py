@@ -10,14 +10,13 @@ from typing import Final
 import mujoco
 import numpy as np
 
+from shared.sim.arena import BASE_YAW
 from shared.sim.arm import Arm, Float64, Inertial, combine, load_arm, load_stance
 from shared.sim.config import SimConfig
 from shared.sim.parameters import BatParameters, ModelParameters
 
 AGENTS: Final = ("antagonist", "protagonist")
 """Index 0 and 1 wherever agents are in an array."""
-BASE_YAW: Final = (math.pi, 0.0)
-"""The antagonist stands at +x and looks along -x (rad)."""
 CONTROLS: Final = 7
 """Per agent: desired tool position and quaternion (w, x, y, z) in its torso frame."""
 SENSORS: Final = 20

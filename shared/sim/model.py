@@ -10,8 +10,9 @@ import mujoco
 import numpy as np
 
 from shared.errors import ConfigError
+from shared.sim.arena import BASE_YAW
 from shared.sim.arm import Float64
-from shared.sim.build import AGENTS, BASE_YAW, base_position, build_spec
+from shared.sim.build import AGENTS, base_position, build_spec
 from shared.sim.config import Side, SimConfig
 from shared.sim.parameters import ModelParameters, load_parameters
 from shared.sim.visuals import Shape, add_visuals, shapes_of

@@ -1,0 +1,94 @@
+"""Finds the player that a reference names, and refuses one that does not fit this process."""
+
+import dataclasses
+from pathlib import Path
+
+from shared.errors import SnapshotError
+from shared.messages.training import AGENTS, Agent
+from shared.policy.mlp import GaussianPolicy
+from shared.policy.players import SCRIPTED_PREFIX, Player, SnapshotPlayer, scripted_player
+from shared.policy.scripted.sight import Arena
+from shared.policy.snapshot import MAX_BYTES, Fit, Snapshot, digest_of, unpack
+
+_DIGEST_PREFIX = "sha256:"
+
+
+@dataclasses.dataclass(frozen=True)
+class NamedPlayer:
+    """A player and how it is known."""
+
+    reference: str
+    """``scripted:<name>`` or ``sha256:<hash>``: the same player for ever."""
+    player: Player
+
+
+@dataclasses.dataclass(frozen=True)
+class Loader:
+    """Loads the players of one side."""
+
+    agent: Agent
+    fit: Fit
+    arena: Arena
+    run: Path
+    """Folder of this run, in which ``sha256:`` references are looked up."""
+
+    def load(self, text: str) -> NamedPlayer:
+        """Return the player that a text names.
+
+        Args:
+            text: ``scripted:NAME``, the file of a snapshot, ``RUN:antagonist`` or
+                ``RUN:protagonist`` (the newest version in a run's folder), or ``sha256:HASH``.
+
+        Raises:
+            SnapshotError: there is none, it is damaged, or it does not fit: names the field.
+        """
+        if text.startswith(SCRIPTED_PREFIX):
+            return NamedPlayer(text, scripted_player(text, self.arena))
+        snapshot = self._find(text)
+        if snapshot.card.agent != self.agent:
+            raise SnapshotError(
+                f"snapshot {snapshot.digest[:12]} does not fit here: its agent is "
+                f"{snapshot.card.agent}, this process plays the {self.agent}"
+            )
+        snapshot.check_fits(self.fit)
+        policy = GaussianPolicy(snapshot.weights)
+        return NamedPlayer(snapshot.reference, SnapshotPlayer(policy, stochastic=False))
+
+    def _find(self, text: str) -> Snapshot:
+        if text.startswith(_DIGEST_PREFIX):
+            digest = digest_of(text)
+            return unpack(_read(self.run / "snapshots" / f"{digest}.safetensors"), digest)
+        run, _, agent = text.rpartition(":")
+        for known in AGENTS:
+            if run and agent == known:
+                return _newest(Path(run), known)
+        return unpack(_read(Path(text)))
+
+
+def _newest(run: Path, agent: Agent) -> Snapshot:
+    """Return the version of an agent with the highest number in a run's folder."""
+    found: Snapshot | None = None
+    for path in sorted((run / "snapshots").glob("*.safetensors")):
+        snapshot = unpack(_read(path), path.stem)
+        if snapshot.card.agent == agent and (
+            found is None or snapshot.card.policy_version > found.card.policy_version
+        ):
+            found = snapshot
+    if found is None:
+        raise SnapshotError(
+            f"{run} holds no snapshot of the {agent} (in {run / 'snapshots'}); "
+            "give the folder of a run that has trained"
+        )
+    return found
+
+
+def _read(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise SnapshotError(
+            f"snapshot {path} cannot be read ({reason}); give scripted:NAME, a .safetensors file, "
+            "RUN:antagonist, RUN:protagonist or sha256:HASH"
+        ) from None
