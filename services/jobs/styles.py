@@ -76,7 +76,7 @@ def write_styles(folder: Path) -> StylesSummary:
         cast,
         table,
         seed=state.seed,
-        trained_by=_trained_by(folder),
+        trained_by=trained_by(folder),
         selected_by=shlex.join(["riposte", "styles", _place(folder)]),
         commit=commit(),
     )
@@ -102,7 +102,7 @@ def _place(folder: Path) -> str:
     return str(whole.relative_to(here)) if whole.is_relative_to(here) else whole.name
 
 
-def _trained_by(folder: Path) -> str:
+def trained_by(folder: Path) -> str:
     """Return the command line that made a run, or one that trains such a run."""
     try:
         known = msgspec.json.decode((folder / "summary.json").read_bytes(), type=dict[str, object])

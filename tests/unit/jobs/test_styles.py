@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from services import cli
-from services.jobs.styles import write_styles
+from services.jobs.styles import styles_text, trained_by, write_styles
 from services.jobs.styles_summary import StylesSummary
 from shared.errors import ConfigError, RiposteError
 from shared.styles.bouts import save
@@ -99,10 +99,12 @@ def test_no_path_of_this_machine_is_in_what_is_handed_on(run: Path):
 
 
 def test_the_command_that_made_the_run_is_kept(tmp_path: Path):
-    folder = write_run(tmp_path / "run", bouts=3)
     made = {"origin": {"command": "riposte train --phase all --rounds 6"}}
-    (folder / "summary.json").write_text(json.dumps(made))
-    assert write_styles(folder).trained_by == "riposte train --phase all --rounds 6"
+    (tmp_path / "summary.json").write_text(json.dumps(made))
+    assert trained_by(tmp_path) == "riposte train --phase all --rounds 6"
+    (tmp_path / "summary.json").write_text("{}")
+    again = f"riposte train {tmp_path.name}/config.toml --phase all --out AGAIN"
+    assert trained_by(tmp_path) == again
 
 
 def test_the_page_loads_nothing_and_names_everybody(run: Path, summary: StylesSummary):
@@ -119,23 +121,24 @@ def test_the_page_loads_nothing_and_names_everybody(run: Path, summary: StylesSu
     assert "goal of 90% for three policies is met" in page
 
 
-def test_the_same_table_gives_the_same_bytes(run: Path):
-    before = [(run / "styles" / name).read_bytes() for name in ("styles.json", "styles.html")]
-    bundle = (run / "bundle" / "bundle.toml").read_bytes()
-    write_styles(run)
-    after = [(run / "styles" / name).read_bytes() for name in ("styles.json", "styles.html")]
-    assert before == after
-    assert bundle == (run / "bundle" / "bundle.toml").read_bytes()
+def test_the_command_prints_json_and_the_same_table_gives_the_same_bytes(
+    run: Path, capsys: pytest.CaptureFixture[str]
+):
+    files = ("styles/styles.json", "styles/styles.html", "bundle/bundle.toml")
+    before = [(run / name).read_bytes() for name in files]
+    assert cli.main(["styles", str(run), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads(before[0])
+    assert [(run / name).read_bytes() for name in files] == before
 
 
-def test_the_command_prints_a_table_or_json(run: Path, capsys: pytest.CaptureFixture[str]):
-    assert cli.main(["styles", str(run)]) == 0
-    said = capsys.readouterr().out
+def test_the_screen_names_the_selected_and_where_the_rest_is(run: Path, summary: StylesSummary):
+    said = styles_text(summary, run)
     assert "round 2*" in said
+    assert "round 1*" not in said
     assert "selected  round 2, round 4, round 6" in said
     assert "told apart of three: 100.0%" in said
-    assert cli.main(["styles", str(run), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["run"] == "made-up"
+    assert f"{summary.effective_styles.value:.2f} [" in said
+    assert str(run / "bundle") in said
 
 
 def test_styles_that_differ_in_more_than_three_ways_are_said_to(tmp_path: Path):
