@@ -110,7 +110,7 @@ def ratings_of(payoff: Payoff, generator: np.random.Generator) -> Ratings:
     count = len(payoff.antagonists)
 
     def estimate(k: int) -> Estimate:
-        return Estimate(ELO * strengths[k], ELO * low[k], ELO * high[k])
+        return Estimate(*(ELO * float(number[k]) for number in (strengths, low, high)))
 
     def pool(
         players: tuple[str, ...], first: int, axis: int, won: NDArray[np.int64]
@@ -172,9 +172,10 @@ def refit(strengths: Floats, total: Floats, shares: Floats, played: NDArray[np.b
         expected: Floats = 1.0 / (1.0 + np.exp(-(found @ design.T)))
         slope: Floats = (weights * (expected - won)) @ design + ridge * found
         curvature: Floats = weights * expected * (1.0 - expected)
-        hessian: Floats = (curvature[:, None, :] * design.T) @ design
+        hessian: Floats = np.asarray((curvature[:, None, :] * design.T) @ design, np.float64)
         hessian += np.diag(ridge)
-        step: Floats = np.linalg.solve(hessian, slope[:, :, None])[:, :, 0]
+        solved = np.linalg.solve(hessian, slope[:, :, None])[:, :, 0]
+        step: Floats = np.asarray(solved, np.float64)
         longest: Floats = np.abs(step).max(axis=1, keepdims=True)
         found = found - step / np.maximum(1.0, longest / LONGEST_STEP)
         if longest.max() < NEWTON_TOLERANCE:

@@ -43,6 +43,9 @@ LEAGUE_STATE = "league/state"
 VERSIONS = "league/version"
 SERVICES = "services"
 LOG = "log"
+PAYOFF = "tournament/payoff"
+RATINGS = "tournament/ratings"
+STANDINGS = "tournament/standings"
 FLUSH_SECONDS = 0.05
 """How long a flush waits for a slow disk; what is not written by then is written later."""
 FILE_HOLD = 10.0
