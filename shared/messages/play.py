@@ -29,6 +29,33 @@ class BatStates(Message, frozen=True, kw_only=True):
     """Game time of the running bout (s); 0 outside one."""
 
 
+class ArmStates(Message, frozen=True, kw_only=True):
+    """The joints of both arms at one tick, to draw and to record."""
+
+    tick: int
+    """Of the bat states published with it."""
+    boot: str
+    is_there: Annotated[Array, ArraySpec("bool", (2,))]
+    """Whether a robot plays the side, antagonist first."""
+    positions: Annotated[Array, ArraySpec("float64", (2, 7))]
+    """From the shoulder to the wrist (rad); zeros for a side that no robot plays."""
+    velocities: Annotated[Array, ArraySpec("float64", (2, 7))]
+    """The same (rad/s)."""
+
+
+class TrackerPose(Message, frozen=True, kw_only=True):
+    """Where a person's bat is, from a source outside robot_io: the mouse of a browser."""
+
+    sequence: int
+    """Counts the poses of one source from 0."""
+    source: str
+    """Identity of the page or program that sends; a new one is a new tracker."""
+    pose: Annotated[Array, ArraySpec("float64", (7,))]
+    """Bat frame in the world: position (m), orientation (w x y z), +x along the blade."""
+    is_valid: bool = True
+    """False while the source knows that it has lost the bat."""
+
+
 class DesiredOffset(Message, frozen=True, kw_only=True):
     """A policy's answer to one tick."""
 

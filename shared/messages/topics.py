@@ -18,6 +18,7 @@ from shared.messages.league import (
 from shared.messages.live import BoutFrames, Progress, ServiceStatus
 from shared.messages.message import Message
 from shared.messages.play import (
+    ArmStates,
     BatStates,
     DesiredOffset,
     GateReply,
@@ -29,6 +30,7 @@ from shared.messages.play import (
     PlayReply,
     PlayRequest,
     RefereeState,
+    TrackerPose,
 )
 from shared.messages.training import (
     PolicyAnnouncement,
@@ -139,6 +141,14 @@ BATS = Topic(
     "play/bats", BatStates, Qos.STREAM, 4 * KIB, "robot_io", "policy, referee, recorder",
     "both bats, 100 a second",
 )
+ARMS = Topic(
+    "play/arms", ArmStates, Qos.STREAM, 4 * KIB, "robot_io", "play, recorder",
+    "joints of the robots that play",
+)
+TRACKER = Topic(
+    "play/tracker", TrackerPose, Qos.STREAM, 4 * KIB, "play", "robot_io, recorder",
+    "a person's bat, from a page",
+)
 OFFSET = Topic(
     "play/{agent}/offset", DesiredOffset, Qos.STREAM, 4 * KIB, "policy", "robot_io, recorder",
     "where the tool should go from here",
@@ -183,5 +193,6 @@ SERVICES: tuple[Service[Any, Any], ...] = (
     ARM,
 )
 TOPICS: tuple[Topic[Any], ...] = (
-    POLICY, SCHEDULE, PROGRESS, STATUS, FRAMES, BATS, OFFSET, REFEREE, GATE, HEART_RATE,
+    POLICY, SCHEDULE, PROGRESS, STATUS, FRAMES, BATS, ARMS, TRACKER, OFFSET, REFEREE, GATE,
+    HEART_RATE,
 )  # fmt: skip
