@@ -128,7 +128,7 @@ def _shape(found: Reproduction, stages: Sequence[StageSummary]) -> list[Claim]:
                 f"level from 0 at most {points_text(bound, sign=False)}, half of iteration 1's "
                 "swing",
                 _unknown(bool(wanted), f"swing {swings}; level {levels}"),
-                holds if wanted else None,
+                holds if wanted and bound > 0.0 else None,
             )
         )  # fmt: skip
     return claims
