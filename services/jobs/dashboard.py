@@ -198,6 +198,7 @@ def line(state: State) -> str:
     parts = [
         f"stage {progress.stage + 1}/{progress.stages}",
         f"{progress.agent} learns",
+        *_round_parts(progress),
         f"update {progress.update}/{progress.max_updates}",
         f"score {_score_text(progress)}" if progress.score_bouts else "no complete bout yet",
         f"{_short(progress.total_samples)} samples, {_short(progress.samples_per_s)}/s",
@@ -209,6 +210,17 @@ def line(state: State) -> str:
     if progress.eta_seconds >= 0:
         parts.append(f"ETA {clock_text(progress.eta_seconds)}")
     return ", ".join(parts)
+
+
+def _round_parts(progress: Progress) -> list[str]:
+    """Return where a round of phase two stands, and who was drawn; nothing in phase one."""
+    if not progress.round:
+        return []
+    return [
+        f"against {progress.opponent}",
+        f"round {progress.round}/{progress.rounds}",
+        f"iteration {progress.iteration}/{progress.iterations}",
+    ]
 
 
 def render(state: State) -> RenderableType:
@@ -267,6 +279,8 @@ def _progress(state: State) -> RenderableType:
     if progress.agent:
         style = COLOURS.get(progress.agent, "")
         who = Text.assemble((progress.agent, f"bold {style}"), " learns")
+        if progress.round:
+            who.append(f" v {progress.opponent}", style="dim")
         share = progress.update / max(1, progress.max_updates)
         count = f"update {progress.update} of {progress.max_updates}"
         grid.add_row(who, _bar(share, style), _with_eta(count, state.stage_eta()))
@@ -277,6 +291,11 @@ def _progress(state: State) -> RenderableType:
     else:
         grid.add_row(Text(progress.message or "waiting for the learners", "dim"), "", "")
     where = f"phase {progress.phase}, iteration {max(1, progress.iteration)}"
+    if progress.round:
+        where = (
+            f"round {progress.round} of {progress.rounds}, "
+            f"iteration {progress.iteration} of {progress.iterations}"
+        )
     if not progress.agent:
         where = "whole run"
     stage = f"stage {max(0, progress.stage) + 1} of {progress.stages}"

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 
+from services.jobs.rounds import RoundSummary, round_summaries
 from services.league.history import (
     SCRIPTED_STATIC,
-    CurvePoint,
     EvaluationRecord,
     RunState,
-    StageRecord,
 )
+from services.league.records import CurvePoint, StageRecord
 from shared.game.rules import RuleBook
 from shared.telemetry.intervals import Interval, difference_interval, mean_interval
 
@@ -51,7 +51,7 @@ class Curve(Frozen, frozen=True, kw_only=True):
 
 
 class StageSummary(Frozen, frozen=True, kw_only=True):
-    """One stage."""
+    """One stage of phase one."""
 
     index: int
     iteration: int
@@ -156,6 +156,9 @@ class Summary(Frozen, frozen=True, kw_only=True):
     updates: int
     bout_seconds: float
     stages: tuple[StageSummary, ...]
+    """Of phase one."""
+    rounds: tuple[RoundSummary, ...] = ()
+    """Of phase two."""
     meetings: tuple[Meeting, ...]
     differences: tuple[Difference, ...]
     headline_differences: tuple[Difference, ...]
@@ -197,7 +200,8 @@ def summarise(state: RunState, facts: Facts) -> Summary:
     for incident in state.incidents:
         counts[incident.what] = counts.get(incident.what, 0) + 1
     end_ns = state.finished_at_ns or state.last_at_ns
-    training = sum(stage.seconds for stage in stages)
+    rounds = round_summaries(state, facts.rules.bout_steps)
+    training = sum(part.seconds for part in (*stages, *rounds))
     samples = sum(state.total_samples.values())
     return Summary(
         run=state.run,
@@ -213,9 +217,10 @@ def summarise(state: RunState, facts: Facts) -> Summary:
         first_update_seconds=_first_update(state),
         samples=samples,
         samples_per_s=samples / training if training > 0 else 0.0,
-        updates=sum(stage.updates for stage in stages),
+        updates=sum(part.updates for part in (*stages, *rounds)),
         bout_seconds=facts.rules.bout_steps * facts.control_timestep,
         stages=stages,
+        rounds=rounds,
         meetings=meetings,
         differences=differences,
         headline_differences=_headline_pair(differences),
@@ -257,6 +262,8 @@ def _stages(state: RunState, generator: np.random.Generator) -> tuple[StageSumma
     before = 0
     found: list[StageSummary] = []
     for record in state.stages:
+        if record.stage.round:
+            break
         found.append(_stage(state, record, before, generator))
         before += record.samples
     return tuple(found)
@@ -340,8 +347,8 @@ def _meeting(
 
 def _differences(state: RunState, generator: np.random.Generator) -> tuple[Difference, ...]:
     """Return what each iteration's protagonist takes and what the next antagonist regains."""
-    antagonists = [f"sha256:{r.end_snapshot}" for r in state.stage_ends("antagonist")]
-    protagonists = [f"sha256:{r.end_snapshot}" for r in state.stage_ends("protagonist")]
+    antagonists = [record.end_ref for record in state.stage_ends("antagonist", 0)]
+    protagonists = [record.end_ref for record in state.stage_ends("protagonist", 0)]
 
     def scores(antagonist: str, protagonist: str) -> list[float]:
         record = state.evaluations.get((antagonist, protagonist))

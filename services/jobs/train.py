@@ -1,12 +1,10 @@
-"""`riposte train`: phase one on this machine, from two fresh policies to a report.
+"""`riposte train`: two fencers on this machine, from fresh policies to a report.
 
 Starts router, league, two learners, recorder and actors, watches them, shows where the run
 stands, and ends with the report. ``--serial`` runs the same services in one process.
 """
 
-import argparse
 import contextlib
-import datetime
 import os
 import sys
 import threading
@@ -14,22 +12,26 @@ from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import structlog
+
+from services.jobs.arguments import check_folder, folder_of, is_over, parse, settings_of
 from services.jobs.processes import StopAsked, run_processes
-from services.jobs.settings import BUDGETS, Settings, TrainConfig
+from services.jobs.settings import Settings, TrainConfig
 from services.supervisor import ProcessSpec, service_command
 from shared.bus.base import Bus
 from shared.clock import Clock, SystemClock
-from shared.errors import ConfigError
 from shared.messages.training import AGENTS
 from shared.runtime.files import RunLock, atomic_write, require_free_space
 from shared.runtime.logging import configure_logging
 from shared.runtime.process import THREAD_LIMITS
-from shared.runtime.serve import run_id_of, stop_on_signals
+from shared.runtime.serve import stop_on_signals
 
 if TYPE_CHECKING:
     from services.jobs.dashboard import Dashboard
 
 __all__ = ["TrainConfig", "main"]
+
+log = structlog.get_logger()
 
 FREE_BYTES = 256 << 20
 """A run needs this much disk to begin with."""
@@ -38,12 +40,13 @@ EXIT_INTERRUPTED = 130
 
 def main(argv: Sequence[str]) -> int:
     """Run one training job; return the exit code."""
-    found = _parse(argv)
-    overrides = _overrides(found)
-    folder, run = _folder(found)
-    settings = _settings(found, folder, overrides)
+    found = parse(argv)
+    folder, run = folder_of(found)
+    settings = settings_of(found, folder)
+    if found.phase == "two":  # before a folder is made where there is no run
+        check_folder(found, folder, settings)
     with RunLock(folder):
-        _check_folder(folder, resume=found.resume)
+        check_folder(found, folder, settings)
         require_free_space(folder, FREE_BYTES)
         atomic_write(folder / "config.toml", settings.to_toml().encode())
         _point_latest_at(folder)
@@ -53,7 +56,9 @@ def main(argv: Sequence[str]) -> int:
         # A signal ends the loop below; the deadline is for processes that will not stop.
         with stop_on_signals(deadline=180.0) as stop:
             try:
-                if found.serial:
+                if found.resume and is_over(folder, settings):
+                    log.info("run_over", folder=str(folder))
+                elif found.serial:
                     _train_serially(settings, folder, run, found.resume, stop)
                 else:
                     _train(settings, folder, run, stop, view=found.view)
@@ -61,77 +66,6 @@ def main(argv: Sequence[str]) -> int:
                 print(f"\nstopped; continue with: riposte train --resume --out {folder}")
                 return EXIT_INTERRUPTED
         return _conclude(folder)
-
-
-def _parse(argv: Sequence[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog="riposte train", description="Train two fencers on this machine, with a report."
-    )
-    parser.add_argument("site", nargs="?", type=Path, metavar="SITE", help="site file (TOML)")
-    parser.add_argument(
-        "--phase", choices=("one",), default="one", help="which phase (%(default)s)"
-    )
-    parser.add_argument("--budget", choices=tuple(BUDGETS), help="how long (the site file's)")
-    parser.add_argument("--actors", type=int, metavar="N", help="actor processes")
-    parser.add_argument("--seed", type=int, metavar="S", help="of everything random")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the run")
-    parser.add_argument("--resume", action="store_true", help="continue the run in --out")
-    parser.add_argument("--serial", action="store_true", help="one process, same seed same bits")
-    parser.add_argument("--view", action="store_true", help="open the live view in a browser")
-    parser.add_argument(
-        "--set", action="append", default=[], dest="overrides", metavar="SECTION.KEY=VALUE",
-        help="over the site file; may be repeated",
-    )  # fmt: skip
-    return parser.parse_args(argv)
-
-
-def _overrides(found: argparse.Namespace) -> list[str]:
-    overrides = list(BUDGETS[found.budget]) if found.budget else []
-    if found.actors is not None:
-        overrides.append(f"train.actors={found.actors}")
-    if found.seed is not None:
-        overrides.append(f"train.seed={found.seed}")
-    return [*overrides, *found.overrides]
-
-
-def _folder(found: argparse.Namespace) -> tuple[Path, str]:
-    """Return the run's folder and its name on the bus."""
-    if found.out is not None:
-        folder: Path = found.out
-    elif found.resume:
-        folder = Path("runs/latest")
-        if not folder.exists():
-            raise ConfigError("there is no run to resume in runs/latest; name it with --out DIR")
-        folder = folder.resolve()
-    else:
-        stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
-        folder = Path("runs") / f"train-{stamp}"
-    return folder, run_id_of(folder)
-
-
-def _settings(found: argparse.Namespace, folder: Path, overrides: Sequence[str]) -> Settings:
-    """Return the settings: those the run began with when resuming, else site file and flags."""
-    saved = folder / "config.toml"
-    if found.resume and saved.exists():
-        if found.site is not None:
-            raise ConfigError(f"--resume continues with {saved}; leave the site file out")
-        return Settings.load(saved, overrides)
-    return Settings.load(found.site, overrides)
-
-
-def _check_folder(folder: Path, *, resume: bool) -> None:
-    """Refuse to mix two runs.
-
-    Raises:
-        ConfigError: there is a run and ``resume`` is not asked for, or the other way round.
-    """
-    has_run = (folder / "league.sqlite").exists()
-    if has_run and not resume:
-        raise ConfigError(
-            f"{folder} holds a run already; continue it with --resume, or choose another --out"
-        )
-    if resume and not has_run:
-        raise ConfigError(f"{folder} holds no run to resume; leave --resume out to start one")
 
 
 def _point_latest_at(folder: Path) -> None:

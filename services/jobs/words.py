@@ -2,6 +2,7 @@
 
 import textwrap
 
+from services.jobs.rounds import Estimate
 from services.jobs.summary import Difference, Meeting, Score, Summary
 
 WIDTH = 78
@@ -15,7 +16,11 @@ def headline(summary: Summary) -> str:
     if not summary.finished:
         running = next((s for s in reversed(summary.stages) if s.ended == "no"), None)
         where = "between stages" if summary.stages else "no stage has begun"
-        if running is not None:
+        if summary.rounds:
+            newest = summary.rounds[-1]
+            turn = newest.turns[-1]
+            where = f"in round {newest.round}, iteration {turn.iteration}, {turn.agent} learns"
+        elif running is not None:
             where = (
                 f"in stage {running.index + 1}, {running.agent} at update {running.updates} "
                 f"of {running.max_updates}"
@@ -26,6 +31,13 @@ def headline(summary: Summary) -> str:
             where = f"in the evaluation, {played:,} of {planned:,} bouts played"
         return f"Not finished: {where}, after {effort}."
     text = f"Phase one, {times}, both fencers trained from nothing on {effort}"
+    if summary.rounds:
+        rounds = "one round" if len(summary.rounds) == 1 else f"{len(summary.rounds)} rounds"
+        played = summary.rounds[-1].turns[-1].iteration
+        text = (
+            f"Phase one, {times}, and phase two, {rounds} of {played} iterations, "
+            f"trained on {effort}"
+        )
     parts = [_claim(difference) for difference in summary.headline_differences]
     return f"{text}: {', and '.join(parts)}." if parts else f"{text}."
 
@@ -82,6 +94,16 @@ def summary_text(summary: Summary) -> str:
         lines.append(
             f"{name:<26}{stage.updates:>9}{_short(stage.samples):>10}"
             f"{clock_text(stage.seconds):>9}{_mean(stage.first):>14}{_mean(stage.last):>8}"
+        )
+    if summary.rounds:
+        lines += [
+            "",
+            "round                       updates   samples     time  score: first    last",
+        ]
+    for played in summary.rounds:
+        lines.append(
+            f"{played.round:<26}{played.updates:>9}{_short(played.samples):>10}"
+            f"{clock_text(played.seconds):>9}{_mean(played.first):>14}{_mean(played.last):>8}"
         )
     if summary.meetings:
         lines += ["", *_matrix(summary)]
@@ -153,7 +175,7 @@ def _counts(summary: Summary) -> list[tuple[str, int]]:
     return found
 
 
-def _mean(score: Score | None) -> str:
+def _mean(score: Score | Estimate | None) -> str:
     return points_text(score.mean) if score is not None else "-"
 
 

@@ -83,7 +83,7 @@ def phase_between(state: RunState) -> str:
     """Return the phase in words while no stage runs."""
     if state.finished:
         return "finished"
-    return "evaluation" if state.evaluation_started_at_ns is not None else "start"
+    return "start" if state.evaluation_started_at_ns is None else "evaluation"
 
 
 def latest_scores(state: RunState) -> list[float]:
