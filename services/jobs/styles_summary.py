@@ -171,13 +171,8 @@ def cast_of(state: RunState, table: BoutTable) -> Cast:
     """Return who of a run's tournament is who.
 
     Raises:
-        ConfigError: the table is another run's, or the run has too few protagonists to select from.
+        ConfigError: the run has too few protagonists to select from.
     """
-    if state.run != table.provenance.run:
-        raise ConfigError(
-            f"the table of bouts is of run {table.provenance.run!r}, this run is {state.run!r}; "
-            "play its own with: riposte tournament RUN"
-        )
     pairs = state.library()
     if len(pairs) < selection.SELECTED:
         raise ConfigError(
@@ -206,7 +201,7 @@ def sample_of(cast: Cast, table: BoutTable) -> StyleSample:
     absent = [label for label, ref in cast.opponents.items() if ref not in table.antagonists]
     if absent:
         raise RiposteError(
-            f"the table of bouts has none against the {absent[0]}; "
+            f"the table of bouts has none against the {absent[0]}, or is of another run; "
             "play them with: riposte tournament RUN"
         )
     met = {

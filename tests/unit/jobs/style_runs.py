@@ -25,6 +25,7 @@ from tests.unit.policy.making import snapshot
 from tests.unit.styles.samples import NOISE, THREE_OF_SIX, TYPICAL
 
 MODEL = "m" * 64
+RUN = "made-up"
 STATIC = "scripted:static"
 
 
@@ -34,7 +35,7 @@ def player(agent: str, round: int) -> Snapshot:
     return snapshot(seed=number, agent=agent, policy_version=1 + round)
 
 
-def write_run(folder: Path, rounds: int = 6, bouts: int = 20, run: str = "made-up") -> Path:
+def write_run(folder: Path, rounds: int = 6, bouts: int = 20) -> Path:
     """Write a finished run whose protagonists' styles are THREE_OF_SIX; return its folder."""
     (folder / "snapshots").mkdir(parents=True)
     ledger = Ledger(folder / "league.sqlite")
@@ -45,7 +46,7 @@ def write_run(folder: Path, rounds: int = 6, bouts: int = 20, run: str = "made-u
         at += 10**9
         ledger.append([event], at)
 
-    add(RunStarted(run=run, seed=5, serial=False, config=LeagueConfig()))
+    add(RunStarted(run=RUN, seed=5, serial=False, config=LeagueConfig()))
     for index, (number, agent) in enumerate(
         (number, agent) for number in range(rounds + 1) for agent in AGENTS
     ):
@@ -67,11 +68,11 @@ def write_run(folder: Path, rounds: int = 6, bouts: int = 20, run: str = "made-u
     add(RunFinished())
     ledger.close()
     (folder / "tournament").mkdir()
-    save(table(rounds, bouts, run), folder / "tournament" / "bouts.parquet")
+    save(table(rounds, bouts), folder / "tournament" / "bouts.parquet")
     return folder
 
 
-def table(rounds: int = 6, bouts: int = 20, run: str = "made-up", seed: int = 0) -> BoutTable:
+def table(rounds: int = 6, bouts: int = 20, seed: int = 0) -> BoutTable:
     """Return the bouts of the library, the warm start and a still player, against everybody."""
     generator = np.random.default_rng(seed)
     antagonists = [player("antagonist", number).reference for number in range(rounds + 1)]
@@ -100,6 +101,6 @@ def table(rounds: int = 6, bouts: int = 20, run: str = "made-up", seed: int = 0)
         camping_steps=zero,
         features=features,
         provenance=Provenance(
-            run=run, seed=9, model=MODEL, control_timestep=0.01, game=RuleBook(), labels={}
+            run=RUN, seed=9, model=MODEL, control_timestep=0.01, game=RuleBook(), labels={}
         ),
     )

@@ -162,13 +162,16 @@ def test_runs_that_cannot_be_judged_are_refused_in_one_line(
 ):
     short = write_run(tmp_path / "short", rounds=2, bouts=2)
     other = write_run(tmp_path / "other", bouts=2)
-    save(table(bouts=2, run="another"), other / "tournament" / "bouts.parquet")
+    foreign = table(bouts=2)
+    strangers = tuple(player("antagonist", 50 + k).reference for k in range(7))
+    foreign = dataclasses.replace(foreign, antagonists=strangers)
+    save(foreign, other / "tournament" / "bouts.parquet")
     unplayed = write_run(tmp_path / "unplayed", bouts=2)
     (unplayed / "tournament" / "bouts.parquet").unlink()
     for folder, complaint in (
         (tmp_path / "nowhere", "holds no run (no league.sqlite)"),
         (short, "needs at least 3 rounds of phase two, this run has 2"),
-        (other, "is of run 'another', this run is 'made-up'"),
+        (other, "none against the antagonist of round 1, or is of another run"),
         (unplayed, "play the bouts with: riposte tournament RUN"),
     ):
         assert cli.main(["styles", str(folder)]) == 2
