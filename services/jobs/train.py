@@ -14,7 +14,15 @@ from typing import TYPE_CHECKING
 
 import structlog
 
-from services.jobs.arguments import check_folder, folder_of, is_over, parse, settings_of
+from services.jobs import pipeline
+from services.jobs.arguments import (
+    check_folder,
+    folder_of,
+    is_over,
+    parse,
+    settings_of,
+    state_of,
+)
 from services.jobs.processes import StopAsked, run_processes
 from services.jobs.settings import Settings, TrainConfig
 from services.supervisor import ProcessSpec, service_command
@@ -49,6 +57,8 @@ def main(argv: Sequence[str]) -> int:
         check_folder(found, folder, settings)
         require_free_space(folder, FREE_BYTES)
         atomic_write(folder / "config.toml", settings.to_toml().encode())
+        if found.phase == "all" and not pipeline.is_begun(folder):
+            pipeline.write(folder, pipeline.Pipeline())
         _point_latest_at(folder)
         configure_logging(
             folder / "logs" / "train.jsonl", bound={"service": "train", "run_id": run}
@@ -65,7 +75,13 @@ def main(argv: Sequence[str]) -> int:
             except StopAsked:
                 print(f"\nstopped; continue with: riposte train --resume --out {folder}")
                 return EXIT_INTERRUPTED
-        return _conclude(folder)
+        code = _conclude(folder)
+        is_whole = found.phase == "all" or (found.phase is None and pipeline.is_begun(folder))
+        if code or not is_whole:
+            return code
+        position = state_of(folder).position
+    # Each of these takes the locks it needs.
+    return pipeline.run_jobs(folder, position) or _conclude(folder)
 
 
 def _point_latest_at(folder: Path) -> None:
