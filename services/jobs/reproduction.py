@@ -14,7 +14,14 @@ import numpy as np
 from services.jobs.draws import Draw, fit_of, replay
 from services.jobs.reproduction_claims import claims_of
 from services.jobs.reproduction_page import page
-from services.jobs.reproduction_parts import Draws, Missing, Reproduction, Stage, Stretch
+from services.jobs.reproduction_parts import (
+    Draws,
+    Missing,
+    Pipeline,
+    Reproduction,
+    Stage,
+    Stretch,
+)
 from services.jobs.reproduction_sources import (
     exploitability_part,
     styles_part,
@@ -139,7 +146,7 @@ def _draws(number: int, draws: Sequence[Draw], generator: np.random.Generator) -
 
 
 def stage_times(folder: Path, summary: Summary) -> tuple[Stage, ...]:
-    """Return how long each stage took, by the ledgers of training and of the tournament."""
+    """Return how long each stage took, by the ledgers, and by ``pipeline.json`` what came after."""
     found = [
         Stage(
             name=f"phase one, iteration {number}",
@@ -150,8 +157,18 @@ def stage_times(folder: Path, summary: Summary) -> tuple[Stage, ...]:
     if summary.evaluation_seconds:
         found.append(Stage(name="evaluation of phase one", seconds=summary.evaluation_seconds))
     found += [Stage(name=f"round {r.round}", seconds=r.seconds) for r in summary.rounds]
-    found += _tournament_time(folder / "tournament" / "league.sqlite")
-    return tuple(found)
+    after = _pipeline_times(folder / "pipeline.json")
+    if not any(stage.name == "tournament" for stage in after):
+        found += _tournament_time(folder / "tournament" / "league.sqlite")
+    return (*found, *after)
+
+
+def _pipeline_times(path: Path) -> tuple[Stage, ...]:
+    """Return the stages after training, of a run begun with its whole pipeline."""
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=Pipeline).stages
+    except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
+        return ()
 
 
 def _tournament_time(path: Path) -> list[Stage]:

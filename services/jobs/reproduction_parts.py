@@ -144,6 +144,12 @@ class Stage(Frozen, frozen=True, kw_only=True):
     seconds: float
 
 
+class Pipeline(Frozen, frozen=True, kw_only=True):
+    """What of ``pipeline.json`` matters here: the stages after training."""
+
+    stages: tuple[Stage, ...] = ()
+
+
 class Claim(Frozen, frozen=True, kw_only=True):
     """What the paper, or a goal of this reproduction, says; what was found; whether they agree."""
 
