@@ -17,7 +17,9 @@ from shared.runtime.files import RunLock
 from shared.runtime.logging import configure_logging
 from shared.runtime.serve import run_id_of, stop_on_signals
 
-ROLES = ("router", "league", "learner", "actor", "recorder")
+ROLES = ("router", "league", "learner", "actor", "recorder", "referee", "policy")
+SIDED = ("learner", "policy")
+"""Roles of which each process belongs to one agent."""
 WRITERS = ("league", "learner")
 """Roles that own files of the run: only one machine, and one `up` on it, may start them."""
 POLL_SECONDS = 0.1
@@ -42,10 +44,11 @@ class SiteConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
             role, _, agent = entry.partition(" ")
             if role not in ROLES:
                 raise ValueError(f"processes has {entry!r}; {nearest(role, ROLES)}")
-            if (role == "learner") != (agent in get_args(Agent)):
+            if (role in SIDED) != (agent in get_args(Agent)):
+                sided = role if role in SIDED else SIDED[0]
                 raise ValueError(
-                    f"processes has {entry!r}, expected 'learner antagonist', "
-                    "'learner protagonist', or another role alone"
+                    f"processes has {entry!r}, expected '{sided} antagonist', "
+                    f"'{sided} protagonist', or another role alone"
                 )
 
 

@@ -18,6 +18,16 @@ def test_each_process_gets_a_name_of_its_own_and_the_same_run(tmp_path: Path):
         assert spec.argv[-2:] == ("--set", "a.b=1")
 
 
+def test_a_live_bout_is_a_site_of_its_own(tmp_path: Path):
+    cfg = SiteConfig(processes=("router", "referee", "policy antagonist", "policy protagonist"))
+    made = specs(cfg, site=tmp_path / "s.toml", run=tmp_path, run_id="r", node="", overrides=[])
+    assert [spec.name for spec in made][1:] == [
+        "referee-0", "policy-antagonist", "policy-protagonist",
+    ]  # fmt: skip
+    assert "services.policy" in made[3].argv
+    assert made[3].argv[made[3].argv.index("--agent") + 1] == "protagonist"
+
+
 @pytest.mark.parametrize(
     ("processes", "message"),
     [
@@ -25,6 +35,7 @@ def test_each_process_gets_a_name_of_its_own_and_the_same_run(tmp_path: Path):
         (("actr",), "processes has 'actr'; did you mean 'actor'?"),
         (("learner",), "expected 'learner antagonist'"),
         (("actor antagonist",), "expected 'learner antagonist'"),
+        (("referee", "policy"), "has 'policy', expected 'policy antagonist'"),
     ],
 )
 def test_a_role_that_is_none_is_refused(processes: tuple[str, ...], message: str):
