@@ -39,6 +39,7 @@ SERVICES = (
     Command("recorder", "services.recorder.__main__", "writes and shows what happens"),
     Command("policy", "services.policy.__main__", "plays one side of a live bout"),
     Command("referee", "services.referee.__main__", "scores a live bout"),
+    Command("robot-io", "services.robot_io.__main__", "moves a robot, through the safety gate"),
 )
 COMMANDS = {command.name: command for command in (*JOBS, *SERVICES)}
 

@@ -30,6 +30,8 @@ DECLARED = {
     "recorder": "services.recorder.config:RecorderConfig",
     "policy": "services.policy.config:PolicyConfig",
     "referee": "services.referee.config:RefereeConfig",
+    "robot_io": "services.robot_io.config:RobotIoConfig",
+    "safety": "services.robot_io.config:SafetyConfig",
     "train": "services.jobs.settings:TrainConfig",
     "site": "services.jobs.up:SiteConfig",
 }

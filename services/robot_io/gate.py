@@ -102,7 +102,7 @@ class Gate:
             blade: the bat in the tool's frame.
             period: from tick to tick (s).
         """
-        self._cfg = cfg
+        self.cfg = cfg
         self._period = period
         self.space = Space(cfg, blade)
 
@@ -120,7 +120,7 @@ class Gate:
         measured = inputs.measured if is_pose(inputs.measured) else motion.pose
         goal = None if mode == "holding" else memory.goal
         new = advance(
-            motion, goal, measured, self._speed(memory, inputs, mode), self.space, self._cfg,
+            motion, goal, measured, self._speed(memory, inputs, mode), self.space, self.cfg,
             self._period,
         )  # fmt: skip
         is_silent = mode == "holding" and motion.is_still
@@ -161,11 +161,11 @@ class Gate:
             return memory, (f"the gate is {memory.mode}, there is nothing to reset",)
         if reasons := self._faults(inputs):
             return memory, reasons
-        return disarmed(memory, "reset after a trip"), ()
+        return GateMemory(reason="reset after a trip", commanded_at=memory.commanded_at), ()
 
     def obstacles(self, memory: GateMemory, inputs: GateInputs) -> tuple[str, ...]:
         """Return everything that stands in the way of arming."""
-        cfg, reasons = self._cfg, list(self._faults(inputs))
+        cfg, reasons = self.cfg, list(self._faults(inputs))
         if memory.mode == "tripped":
             reasons.insert(0, f"the gate has tripped ({memory.reason}): reset it first")
         elif memory.mode != "disarmed":
@@ -190,7 +190,7 @@ class Gate:
 
     def _faults(self, inputs: GateInputs) -> tuple[str, ...]:
         """Return what of the robot itself is not in order."""
-        cfg = self._cfg
+        cfg = self.cfg
         reasons = list(inputs.problems)
         if inputs.is_run_stopped:
             reasons.append("the run stop is pressed")
@@ -212,7 +212,7 @@ class Gate:
         if (
             not is_sound
             or not is_pose(command)
-            or distance(command.position, inputs.measured.position) > self._cfg.jump
+            or distance(command.position, inputs.measured.position) > self.cfg.jump
         ):
             return msgspec.structs.replace(memory, rejects=memory.rejects + 1)
         goal = Pose(command.position, unit(command.orientation))
@@ -220,7 +220,7 @@ class Gate:
 
     def _watch(self, memory: GateMemory, inputs: GateInputs, motion: Motion) -> GateMemory:
         """Time what may be exceeded for a moment."""
-        cfg = self._cfg
+        cfg = self.cfg
         lead = distance(motion.pose.position, inputs.measured.position)
         return msgspec.structs.replace(
             memory,
@@ -233,7 +233,7 @@ class Gate:
 
     def _trips(self, memory: GateMemory, inputs: GateInputs) -> str:
         """Return why the gate must trip; empty if it need not."""
-        cfg, now = self._cfg, inputs.now
+        cfg, now = self.cfg, inputs.now
         if inputs.is_run_stopped:
             return "the run stop was pressed"
         if inputs.are_motors_halted:
@@ -261,7 +261,7 @@ class Gate:
 
     def _holds(self, memory: GateMemory, inputs: GateInputs) -> str:
         """Return why the robot must hold; empty if it need not."""
-        cfg, now = self._cfg, inputs.now
+        cfg, now = self.cfg, inputs.now
         if memory.rejects:
             return "a command or state cannot be used"
         if not _is_recent(now, inputs.state_at, cfg.state_hold):
@@ -273,7 +273,7 @@ class Gate:
         return ""
 
     def _is_tracked(self, inputs: GateInputs) -> bool:
-        recent = _is_recent(inputs.now, inputs.tracker_at, self._cfg.tracker_hold)
+        recent = _is_recent(inputs.now, inputs.tracker_at, self.cfg.tracker_hold)
         return inputs.is_tracked and recent
 
     def _mode(
@@ -281,23 +281,25 @@ class Gate:
     ) -> tuple[GateMode, str]:
         if holds:
             return "holding", holds
-        if memory.mode == "holding" and inputs.now - good_since < self._cfg.resume_after:
+        if memory.mode == "holding" and inputs.now - good_since < self.cfg.resume_after:
             return "holding", memory.reason
-        if inputs.now - memory.armed_at < self._cfg.ramp:
+        if inputs.now - memory.armed_at < self.cfg.ramp:
             return "ramping", ""
         return "armed", ""
 
     def _speed(self, memory: GateMemory, inputs: GateInputs, mode: GateMode) -> float:
         """Return the tool's largest speed now (m/s): minimum-jerk from 0 while ramping."""
-        speed = self._cfg.warm_up_speed if inputs.is_home else self._cfg.game_speed
+        speed = self.cfg.warm_up_speed if inputs.is_home else self.cfg.game_speed
         if mode != "ramping":
             return speed
-        share = min(max((inputs.now - memory.armed_at) / self._cfg.ramp, 0.0), 1.0)
+        share = min(max((inputs.now - memory.armed_at) / self.cfg.ramp, 0.0), 1.0)
         return speed * share**3 * (10.0 + share * (6.0 * share - 15.0))
 
 
 def disarmed(memory: GateMemory, reason: str) -> GateMemory:
     """Return the gate shut by a person's will; a trip stays a trip until it is reset."""
+    if memory.mode == "tripped":
+        return memory
     return GateMemory(reason=reason, commanded_at=memory.commanded_at)
 
 

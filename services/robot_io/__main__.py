@@ -1,0 +1,100 @@
+"""``python -m services.robot_io``: the process that moves a robot; its loop keeps time itself."""
+
+import contextlib
+import os
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import structlog
+
+from services.robot_io.config import RobotIoConfig, SafetyConfig
+from services.robot_io.gate import Gate
+from services.robot_io.limits import Blade
+from services.robot_io.service import Parts, RobotIo, pose_of
+from services.robot_io.trackers import PageTracker, PolicyTracker, ReplayTracker, Tracker
+from services.robot_io.twin import TwinLink
+from shared.bus.base import Bus
+from shared.clock import Clock, SystemClock
+from shared.runtime.serve import ServeArgs, open_site_bus, serve_plain
+from shared.runtime.service import StatusReporter
+from shared.sim.config import SimConfig
+from shared.sim.model import FencingModel
+from shared.sim.twin import Twin, command_of
+
+ROLE = "robot-io"
+
+log = structlog.get_logger()
+
+
+def build(args: ServeArgs, bus: Bus, clock: Clock) -> RobotIo:
+    """Return the loop that the command line asks for."""
+    cfg = args.section("robot_io", RobotIoConfig)
+    safety = args.section("safety", SafetyConfig)
+    sim = args.section("sim", SimConfig)
+    return RobotIo(cfg, twin_parts(cfg, safety, sim, bus), sim.control_timestep, bus, clock)
+
+
+def twin_parts(cfg: RobotIoConfig, safety: SafetyConfig, sim: SimConfig, bus: Bus) -> Parts:
+    """Return a twin, its gate and whoever plays against it."""
+    model = FencingModel.build(sim)
+    is_robot = cfg.tracker == "policy"
+    twin = Twin(
+        model, command_of(cfg.twin_filter, cfg.twin_delay), cfg.twin_force, person=not is_robot
+    )
+    link = TwinLink(twin)
+    angle = model.parameters.bat.mount_angle
+    blade = Blade(
+        direction=(float(np.cos(angle)), 0.0, float(np.sin(angle))),
+        front=model.bat_front,
+        back=model.bat_back,
+        radius=model.bat_radius,
+    )
+    tracker: Tracker
+    if is_robot:
+        tracker = PolicyTracker(link)
+    elif cfg.tracker == "replay":
+        tracker = ReplayTracker.load(Path(cfg.replay))
+    else:
+        # Until the page says where the bat is, it stands where a robot's would.
+        start = Twin(model, command_of(1.0, 0.0), cfg.twin_force, person=False).bat(0)
+        tracker = PageTracker(bus, pose_of(start[:7]))
+    return Parts(
+        gate=Gate(safety, blade, sim.control_timestep),
+        link=link,
+        tracker=tracker,
+        home=pose_of(twin.tools()[1]),
+        other=link if is_robot else None,
+        person=None if is_robot else link,
+    )
+
+
+def run(service: RobotIo, bus: Bus, clock: Clock, stop: threading.Event) -> None:
+    """Tick at absolute deadlines, and whenever something arrives, until ``stop`` is set."""
+    bus.declare_alive(ROLE)
+    reporter = StatusReporter(service, bus, clock, ROLE)
+    while not stop.is_set():
+        service.tick()
+        reporter.tick()
+        bus.wait(max(service.due_at - clock.now(), 0.0))
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the loop until it is told to stop; return the exit code."""
+    clock = SystemClock()
+
+    def body(args: ServeArgs, stop: threading.Event) -> None:
+        with (
+            contextlib.closing(open_site_bus(args, clock)) as bus,
+            contextlib.closing(build(args, bus, clock)) as service,  # closing holds the robot
+        ):
+            log.info("service_started", pid=os.getpid(), boot=bus.boot)
+            run(service, bus, clock, stop)
+
+    return serve_plain(ROLE, body, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
