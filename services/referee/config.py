@@ -15,8 +15,8 @@ class RefereeConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     def __post_init__(self) -> None:
         """Check the ranges."""
-        if not 0.02 <= self.stale_after <= 1.0:
-            raise ValueError(f"stale_after ({self.stale_after} s) must be in [0.02, 1]")
+        if not 0.02 <= self.stale_after <= 10.0:
+            raise ValueError(f"stale_after ({self.stale_after} s) must be in [0.02, 10]")
         if not self.stale_after < self.void_after <= 60.0:
             raise ValueError(
                 f"void_after ({self.void_after} s) must be over stale_after "

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from services.supervisor import service_command
+from shared.bus.base import NoAnswer
 from shared.bus.config import BusConfig
 from shared.bus.zenoh import open_zenoh
 from shared.clock import SystemClock
@@ -109,12 +110,15 @@ class Stage:
         while (offset := self._offsets.take()) is not None:
             self.offsets.append(offset)
 
-    def until(self, condition: Callable[[], X], seconds: float = 30.0) -> X:
+    def until(self, condition: Callable[[], X], seconds: float = 60.0) -> X:
         deadline = time.monotonic() + seconds
         while not (value := condition()):
             assert time.monotonic() < deadline, f"did not happen; seen last: {self.seen[-1:]}"
             self.listen()
         return value
+
+    def alive(self, role: str) -> bool:
+        return bool(self.bus.alive(role))
 
     def phase(self, bout: str = "") -> str:
         """Return the phase of a bout, as far as the referee has said."""
@@ -125,6 +129,8 @@ class Stage:
         request = PlayRequest(action=action, bout=bout, antagonist="a", protagonist="p")  # type: ignore[arg-type]
         pending = self.bus.ask(BOUT, request, 5.0)
         answer = self.until(pending.take)
+        if isinstance(answer, NoAnswer):  # it is not there yet
+            return PlayReply(accepted=False, phase="ready", reason=answer.reason)
         assert isinstance(answer, PlayReply), answer
         return answer
 
@@ -138,9 +144,9 @@ class Stage:
 
     def begin(self, bout: str) -> None:
         """Start a bout once the referee is there and the bats are tracked."""
-        self.until(lambda: self.seen)
+        self.until(lambda: self.alive("referee"))
         self.until(lambda: self.ask("start", bout).accepted)
-        self.until(lambda: self.phase(bout) == "running")
+        self.until(lambda: self.phase(bout))
 
     def close(self) -> None:
         for process in self._processes.values():

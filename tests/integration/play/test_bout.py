@@ -1,5 +1,6 @@
 """Live bouts between real processes over real Zenoh, from recorded bat states."""
 
+import re
 import signal
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from tests.unit.policy.making import snapshot
 
 pytestmark = pytest.mark.zenoh
 
-PATIENT = ("referee.stale_after=1.0", "referee.void_after=10.0")
+PATIENT = ("referee.stale_after=10.0", "referee.void_after=30.0")
 """A busy machine may hold the publisher up; every tick it sends is judged all the same."""
 
 
@@ -76,28 +77,34 @@ def test_a_killed_policy_does_not_stop_the_referee(
     assert answered < stage.seen[-1].tick - 50
 
 
-def test_lost_tracking_pauses_then_voids_a_bout(stage: Stage):
+def test_lost_tracking_pauses_a_bout_and_good_tracking_resumes_it(stage: Stage):
     stage.start(
-        "referee", "game.bout_steps=100000", "referee.stale_after=0.5", "referee.void_after=3.0"
-    )  # the default 0.1 s and 1 s may pass by themselves on a busy machine
+        "referee", "game.bout_steps=100000", "referee.stale_after=0.5", "referee.void_after=60.0"
+    )
     stage.publish()
     stage.begin("one")
     stage.until(lambda: stage.seen[-1].step > 20)
 
     stage.send_signal("publisher", signal.SIGSTOP)
-    stage.until(lambda: stage.phase() == "paused", 5.0)
-    assert "not tracked" in stage.seen[-1].reason
-    assert stage.seen[-1].tone_hz == 0.0
+    stage.until(lambda: stage.phase() == "paused")
+    paused = stage.seen[-1]
+    assert "not tracked" in paused.reason
+    assert paused.tone_hz == 0.0
     stage.send_signal("publisher", signal.SIGCONT)
-    stage.until(lambda: stage.phase() == "running", 5.0)
+    stage.until(lambda: stage.phase() == "running")
+    stage.until(lambda: stage.seen[-1].step > paused.step + 20)
 
-    step = stage.seen[-1].step
-    stage.until(lambda: stage.seen[-1].step > step + 20)
+
+def test_tracking_lost_for_a_second_voids_a_bout(stage: Stage):
+    stage.start("referee", "game.bout_steps=100000")
+    stage.publish()
+    stage.begin("one")
     stage.send_signal("publisher", signal.SIGSTOP)
-    stage.until(lambda: stage.phase() == "void", 10.0)
-    phases = [state.phase for state in stage.seen]
-    assert phases[-2:] == ["paused", "void"]
-    assert "were not tracked for 3." in stage.seen[-1].reason
+    stage.until(lambda: stage.phase() == "void")
+    assert [state.phase for state in stage.seen][-2:] == ["paused", "void"]
+    found = re.search(r"bats were not tracked for ([\d.]+) s", stage.seen[-1].reason)
+    assert found is not None, stage.seen[-1].reason
+    assert float(found[1]) > 1.0
 
 
 def test_a_killed_referee_stops_the_policy_and_comes_back_ready(stage: Stage):
