@@ -66,6 +66,7 @@ def twin_parts(cfg: RobotIoConfig, safety: SafetyConfig, sim: SimConfig, bus: Bu
         link=link,
         tracker=tracker,
         home=pose_of(twin.tools()[1]),
+        other_home=pose_of(twin.tools()[0]) if is_robot else None,
         other=link if is_robot else None,
         person=None if is_robot else link,
     )

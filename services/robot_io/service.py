@@ -44,6 +44,8 @@ class Parts(msgspec.Struct, frozen=True, kw_only=True):
     tracker: Tracker
     home: Pose
     """En garde, where the robot goes between bouts."""
+    other_home: Pose | None = None
+    """The same of the robot opposite."""
     other: OtherRobot | None = None
     """The robot opposite, if a policy plays there."""
     person: PersonBat | None = None
@@ -142,7 +144,10 @@ class RobotIo:
         self._counters["ticks_lost"] += lost
         self._counters["ticks_late"] += now - due > self._period
         self._robot = self._parts.link.read(now)
-        self._tracked = self._parts.tracker.read(now)
+        tracked = self._parts.tracker.read(now)
+        if not np.isfinite(tracked.state).all():
+            tracked = msgspec.structs.replace(self._tracked, is_valid=False)
+        self._tracked = tracked
         if self._parts.person is not None and self._tracked.is_valid:
             self._parts.person.place_person(self._tracked.state)
         self._publish_states(now)
@@ -150,10 +155,11 @@ class RobotIo:
 
     def _publish_states(self, now: float) -> None:
         robot, tracked = self._robot, self._tracked
-        is_sound = bool(np.isfinite(robot.bat).all() and np.isfinite(robot.tool).all())
+        both = self._both_tools(robot)
+        is_sound = bool(np.isfinite(robot.bat).all() and np.isfinite(both).all())
         if is_sound:
             self._bat = robot.bat
-            self._tools[self._tick] = self._both_tools(robot)
+            self._tools[self._tick] = both
             if len(self._tools) > REMEMBERED_TICKS:
                 self._tools.popitem(last=False)
         hold = self._parts.gate.cfg.state_hold
@@ -220,9 +226,9 @@ class RobotIo:
         """Command the simulated robot opposite, which no gate guards, for it is nobody's."""
         other = self._parts.other
         assert other is not None
-        if self._goes_home:
+        if self._goes_home and self._parts.other_home is not None:
             tool = other.read_other()[1]
-            pose = array_of(way_home(self._parts.home, pose_of(tool)))
+            pose = array_of(way_home(self._parts.other_home, pose_of(tool)))
         if is_pose(pose_of(pose)):
             other.write_other(pose)
 
