@@ -1,0 +1,90 @@
+"""Processes of a live site."""
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from shared.bus.base import Bus
+from shared.bus.config import BusConfig
+from shared.bus.ports import free_port
+from shared.bus.zenoh import open_zenoh
+from shared.clock import SystemClock
+from shared.messages.play import BatStates, GateReply, GateRequest, GateState
+from shared.messages.topics import ARM, BATS, GATE, STATUS
+
+ROOT = Path(__file__).resolve().parents[3]
+POLICY = Path(__file__).with_name("moving_policy.py")
+
+
+class Site:
+    """A router and robot_io, each a process, and what else a test starts; it is the person."""
+
+    def __init__(self, folder: Path) -> None:
+        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
+        self._run = ("--run", str(folder), "--run-id", "live")
+        self.processes: list[subprocess.Popen[bytes]] = []
+        self._start("-m", "services.router", *self._run, "--listen", self.endpoint)
+        self.bus: Bus = open_zenoh(
+            BusConfig(connect=(self.endpoint,)), "person", SystemClock(), "live"
+        )
+        self.bats = self.bus.subscribe(BATS)
+        self.gates = self.bus.subscribe(GATE)
+        self.status = self.bus.subscribe(STATUS, role="robot-io")
+        self.states: list[BatStates] = []
+        self.seen: list[GateState] = []
+        self.service("robot_io")
+
+    def service(self, module: str, *words: str) -> "subprocess.Popen[bytes]":
+        return self._start(
+            "-m", f"services.{module}", *self._run, "--connect", self.endpoint, *words
+        )
+
+    def moving_policy(self) -> "subprocess.Popen[bytes]":
+        return self._start(str(POLICY), self.endpoint)
+
+    def _start(self, *words: str) -> "subprocess.Popen[bytes]":
+        process = subprocess.Popen([sys.executable, *words], cwd=ROOT)
+        self.processes.append(process)
+        return process
+
+    def until(self, condition: Callable[[], bool], seconds: float = 20.0) -> None:
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            while (states := self.bats.take()) is not None:
+                self.states.append(states)
+            while (gate := self.gates.take()) is not None:
+                self.seen.append(gate)
+            if condition():
+                return
+            self.bus.wait(0.01)
+        raise AssertionError(f"not within {seconds} s; the gate: {self.seen[-1:]}")
+
+    def is_mode(self, mode: str) -> bool:
+        return bool(self.seen) and self.seen[-1].mode == mode
+
+    def ask(self, action: str) -> GateReply:
+        asked = GateRequest(action=action, operator="test")  # type: ignore[arg-type]
+        pending = self.bus.ask(ARM, asked, timeout=3.0)
+        self.until(lambda: pending.take() is not None, 5.0)
+        reply = pending.take()
+        assert isinstance(reply, GateReply)
+        return reply
+
+    def arm(self) -> None:
+        self.until(lambda: len(self.states) > 20)
+        replies: list[GateReply] = []
+
+        def accepted() -> bool:  # until the policy's process answers
+            replies.append(self.ask("arm"))
+            return replies[-1].accepted
+
+        self.until(accepted)
+        self.until(lambda: self.is_mode("armed"))
+
+    def close(self) -> None:
+        self.bus.close()
+        for process in reversed(self.processes):
+            process.kill()
+            process.wait()
