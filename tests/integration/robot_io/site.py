@@ -25,7 +25,7 @@ class Site:
         self.endpoint = f"tcp/127.0.0.1:{free_port()}"
         self._run = ("--run", str(folder), "--run-id", "live")
         self.processes: list[subprocess.Popen[bytes]] = []
-        self._start("-m", "services.router", *self._run, "--listen", self.endpoint)
+        self.router = self.start_router()
         self.bus: Bus = open_zenoh(
             BusConfig(connect=(self.endpoint,)), "person", SystemClock(), "live"
         )
@@ -34,12 +34,15 @@ class Site:
         self.status = self.bus.subscribe(STATUS, role="robot-io")
         self.states: list[BatStates] = []
         self.seen: list[GateState] = []
-        self.service("robot_io")
+        self.service("robot_io", "--set", "safety.ramp=0.5")
 
     def service(self, module: str, *words: str) -> "subprocess.Popen[bytes]":
         return self._start(
             "-m", f"services.{module}", *self._run, "--connect", self.endpoint, *words
         )
+
+    def start_router(self) -> "subprocess.Popen[bytes]":
+        return self._start("-m", "services.router", *self._run, "--listen", self.endpoint)
 
     def moving_policy(self) -> "subprocess.Popen[bytes]":
         return self._start(str(POLICY), self.endpoint)
@@ -60,6 +63,11 @@ class Site:
                 return
             self.bus.wait(0.01)
         raise AssertionError(f"not within {seconds} s; the gate: {self.seen[-1:]}")
+
+    def rest(self, seconds: float) -> None:
+        """Listen for so long."""
+        deadline = time.monotonic() + seconds
+        self.until(lambda: time.monotonic() >= deadline, seconds + 1.0)
 
     def is_mode(self, mode: str) -> bool:
         return bool(self.seen) and self.seen[-1].mode == mode

@@ -53,3 +53,23 @@ def test_a_policy_moves_the_robot_and_its_death_holds_then_trips(site: Site):
     for name in ("lateness_p50_ms", "lateness_p99_ms", "command_p50_ms", "command_p99_ms"):
         assert rates[name] >= 0.0
     assert rates["real_time_factor"] == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_router_that_dies_stops_the_robot_and_its_return_does_not_move_it(site: Site):
+    site.moving_policy()
+    site.arm()
+    boot = site.states[-1].boot
+    site.router.kill()
+    site.router.wait()
+    count = len(site.states)
+    site.rest(1.0)
+    assert len(site.states) - count < 20  # nobody hears anybody
+    site.start_router()
+    site.until(lambda: len(site.states) > count + 150)
+    late = site.states[count + 100 :]
+    assert late[-1].boot == boot
+    assert late[-1].tick > site.states[count - 1].tick + 100  # the loop went on by itself
+    assert site.is_mode("tripped")
+    assert site.seen[-1].reason == "no usable command for 0.5 s"
+    still = np.array([states.tools[1, :3] for states in late])
+    assert np.ptp(still, axis=0).max() < 0.002
