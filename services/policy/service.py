@@ -23,6 +23,9 @@ from shared.messages.training import Agent
 from shared.runtime.rate import Rate
 from shared.runtime.service import Health
 
+BEHIND_SECONDS = 0.1
+"""States with less game time than the referee's by more were made before robot_io heard of the
+bout, or of the end of a pause."""
 QUIET_SECONDS = 1.0
 """Without states for so long, the policy says whom it waits for."""
 
@@ -67,6 +70,8 @@ class Policy:
         self._phase = ""
         """Of the bout, as the referee said last."""
         self._referee_at = clock.now()
+        self._game_seconds = 0.0
+        """The referee's game time, as it said last."""
         self._boot = ""
         self._tick = -1
         self._states_at = clock.now()
@@ -115,6 +120,7 @@ class Policy:
         if (said := self._referee.take()) is None:
             return False
         self._phase = said.phase
+        self._game_seconds = said.seconds
         self._referee_at = self._clock.now()
         return True
 
@@ -155,7 +161,7 @@ class Policy:
 
     def _answer(self, states: BatStates, arrived_at: float) -> None:
         offset = HOLD
-        is_in_bout = self.is_in_bout
+        is_in_bout = self.is_in_bout and states.seconds >= self._game_seconds - BEHIND_SECONDS
         if is_in_bout:
             found = self._acting.offset(self._named.player, states.bats, states.seconds)
             if found is None:

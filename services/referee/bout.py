@@ -157,6 +157,8 @@ class LiveBout:
 
     def _move(self, phase: Phase, reason: str) -> bool:
         self.phase, self.reason = phase, reason
+        if phase is Phase.RUNNING:  # game time goes on from here, not from before a pause
+            self._tick = self._tracking.tick
         log.info(
             f"bout_{phase.value}",
             bout=self.fixture.bout,

@@ -120,7 +120,7 @@ class RefereeState(Message, frozen=True, kw_only=True):
     antagonist: str
     protagonist: str
     tick: int
-    """Of the bat states that were judged last."""
+    """Of the bat states that were judged last, or after which the bout was started or resumed."""
     step: int
     """Steps judged."""
     seconds: float

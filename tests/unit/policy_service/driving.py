@@ -66,9 +66,10 @@ class Stand:
         self._offsets = self.bus.subscribe(OFFSET, agent=agent)
         self.tick = 0
 
-    def referee_says(self, phase: Phase) -> None:
+    def referee_says(self, phase: Phase, seconds: float = 0.0) -> None:
         state = RefereeState(
-            bout="one", phase=phase, antagonist="a", protagonist="p", tick=0, step=0, seconds=0.0,
+            bout="one", phase=phase, antagonist="a", protagonist="p", tick=0, step=0,
+            seconds=seconds,
             score=0.0, points=0.0, in_target=np.zeros(2, np.bool_), contact=False,
             attack_steps=0, penalty_steps=0, camping_steps=0, missed_ticks=0, tone_hz=0.0,
         )  # fmt: skip

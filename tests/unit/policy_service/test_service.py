@@ -95,6 +95,22 @@ def test_a_referee_that_falls_silent_ends_the_play(tmp_path: Path):
     assert moved == [True] * 51 + [False] * 9
 
 
+def test_states_from_before_a_pause_ended_do_not_reach_the_player(tmp_path: Path):
+    """A game time that goes back would tell the player that a bout is new."""
+    stand = Stand(tmp_path, "scripted:guard")
+    moved = []
+    for phase, game, seen in (
+        ("running", 5.0, 5.0), ("paused", 5.01, 0.0), ("running", 5.01, 0.0),
+        ("running", 5.01, 5.01), ("running", 5.03, 5.01),
+    ):  # fmt: skip
+        stand.referee_says(phase, game)  # type: ignore[arg-type]
+        stand.send(seconds=seen)
+        answer = stand.answer()
+        assert answer is not None
+        moved.append(bool(np.any(answer.offset)))
+    assert moved == [True, False, False, True, True]
+
+
 def test_only_the_newest_tick_is_answered_and_the_others_are_counted(tmp_path: Path):
     stand = Stand(tmp_path, "scripted:static")
     for _ in range(5):

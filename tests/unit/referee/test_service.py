@@ -107,6 +107,7 @@ def test_silence_pauses_good_tracking_resumes_and_the_pause_is_not_judged():
     assert state.phase == "paused"
     state = stand.bring(HIT, 1)
     assert (state.phase, state.step, state.score) == ("running", 3, 3.0)
+    assert (state.tick, state.seconds) == (stand.tick - 1, 0.03)
     state = stand.bring(HIT, 2)
     assert (state.step, state.score, state.missed_ticks) == (5, 5.0, 0)
 
