@@ -164,7 +164,7 @@ def test_reading_a_bundle_needs_no_library_for_statistics():
 
 
 def test_the_bundle_that_ships_is_a_warm_start_and_three_styles_with_their_origin():
-    bundle = load_bundle(shipped_bundle())
+    bundle = load_bundle(shipped_bundle()).bundle
     assert [player.role for player in bundle.players] == ["warm_start", *["selected"] * 3]
     assert bundle.trained_by.startswith("riposte train --phase all")
     assert len({player.sha256 for player in bundle.players}) == 4
