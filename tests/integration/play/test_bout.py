@@ -57,7 +57,7 @@ def test_a_recorded_bout_is_scored_live_as_the_actor_scored_it(
     assert stage.change_player(str(tmp_path / "right.safetensors")).accepted
     stage.begin("two")
     stage.until(lambda: np.any(stage.offsets[-1].offset))
-    assert stage.offsets[-1].snapshot == right.reference
+    stage.until(lambda: stage.offsets[-1].snapshot == right.reference)
 
 
 def test_a_killed_policy_does_not_stop_the_referee(
