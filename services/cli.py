@@ -55,6 +55,11 @@ EXTRAS = {
     "gymnasium": "env",
     "pettingzoo": "env",
     "cma": "identify",
+    "websockets": "play",
+    "sounddevice": "play",
+    "rosbags": "robot",
+    "openvr": "robot",
+    "bleak": "robot",
 }
 """Import name of an optional library: the extra that installs it."""
 
