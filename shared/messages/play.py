@@ -141,9 +141,9 @@ class RefereeState(Message, frozen=True, kw_only=True):
 
 
 class GateRequest(Message, frozen=True, kw_only=True):
-    """A person asks robot_io to arm or disarm; nothing else may."""
+    """A person asks robot_io to arm or disarm; nothing else may. ``check`` changes nothing."""
 
-    action: Literal["arm", "disarm", "reset"]
+    action: Literal["arm", "disarm", "reset", "check"]
     operator: str
     """Who asks, for the record."""
 
@@ -154,6 +154,8 @@ class GateReply(Message, frozen=True, kw_only=True):
     accepted: bool
     mode: GateMode
     reasons: tuple[str, ...] = ()
+    passed: tuple[str, ...] = ()
+    """What must be so before arming, and is (check)."""
 
 
 class GateState(Message, frozen=True, kw_only=True):
@@ -169,6 +171,8 @@ class GateState(Message, frozen=True, kw_only=True):
     """The command asked for more than the limits allow."""
     lateness_ms: float
     """Of this tick of the loop."""
+    answer_ms: float | None = None
+    """From the bat states being read to the policy's command being sent, where it was."""
     late_ticks: int
     """Ticks more than one period late, since the start."""
 

@@ -4,6 +4,8 @@ The bound is the PR2's own: beyond 3.75 cm or 0.06 rad its Jacobian-transpose co
 no more force (Kd x velocity saturation / Kp, pr2_jt_controllers.launch:18-41).
 """
 
+import functools
+
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
@@ -51,10 +53,15 @@ def bounded_offset(actions: Floats, cfg: ActionConfig) -> Floats:
         part in 3,000 at the bound).
     """
     vectors = actions.reshape(*actions.shape[:-2], 2, 3, actions.shape[-1])
-    bounds = np.array([[cfg.offset_bound_m], [cfg.offset_bound_rad]])
     lengths = np.sqrt(np.add.reduce(vectors * vectors, axis=-2))
-    scale = bounds / np.maximum(lengths, 1.0)
+    scale = _bounds(cfg) / np.maximum(lengths, 1.0)
     return (vectors * scale[..., None, :]).reshape(actions.shape)
+
+
+@functools.lru_cache(maxsize=16)
+def _bounds(cfg: ActionConfig) -> Floats:
+    """Return float64[2, 1]: bound of the translation (m), of the rotation (rad)."""
+    return np.array([[cfg.offset_bound_m], [cfg.offset_bound_rad]])
 
 
 _FACTORS = 3 + np.array([[1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]])

@@ -25,6 +25,7 @@ _ONE = _TIME + 1
 
 _SEEN = 2 * BAT_DIM + 1
 """How many numbers an observer sees."""
+_UNIT = np.float32(1.0)
 
 OWN_REFERENCE = (0.58, 0.55, -0.33, 0.49)
 OTHER_REFERENCE = (0.49, -0.33, -0.55, -0.58)
@@ -82,6 +83,7 @@ class ObservationEncoder:
                 products.append(seen[:, start : start + 4] @ reference)
         products.append(np.eye(2 * BAT_DIM + 2)[_ONE])  # the sign of what has none to choose
         self._map = np.hstack([*maps, np.stack(products, axis=1)]).astype(np.float32)
+        self._known = np.ones((0, 2 * BAT_DIM + 2), np.float32)
         self._spread = np.hstack([_spread(observer, len(yaws)) for observer in range(len(yaws))])
 
     def encode(self, bats: Floats, seconds: Floats, outs: Sequence[Observations]) -> None:
@@ -93,12 +95,13 @@ class ObservationEncoder:
             seconds: float64[N], game time.
             outs: float32[N, 27] for each observer.
         """
-        known = np.empty((len(bats), 2 * BAT_DIM + 2), np.float32)
+        if len(bats) != len(self._known):
+            self._known = np.ones((len(bats), 2 * BAT_DIM + 2), np.float32)
+        known = self._known
         known[:, :_TIME].reshape(-1, 2, BAT_DIM)[:] = bats.reshape(-1, 2, BAT_DIM)
         known[:, _TIME] = seconds
-        known[:, _ONE] = 1.0
         seen = known @ self._map
-        factors = np.copysign(np.float32(1.0), seen[:, len(outs) * _SEEN :]) @ self._spread
+        factors = np.copysign(_UNIT, seen[:, len(outs) * _SEEN :]) @ self._spread
         for observer, out in enumerate(outs):
             columns = slice(observer * _SEEN, (observer + 1) * _SEEN)
             np.multiply(seen[:, columns], factors[:, columns], out=out)

@@ -41,6 +41,15 @@ class ArmJoint:
     """Soft limits (rad), or None for a continuous joint."""
     velocity_limit: float
     """rad/s."""
+    effort_limit: float
+    """N m."""
+    safety_gains: tuple[float, float]
+    """Of the robot's own limiter: 1/s from a soft limit to a velocity, N m s/rad from that to a
+    torque; the first is 0 for a continuous joint."""
+    feedforward: float
+    """Effective inertia that the shipped pose controller's posture term uses (kg m^2)."""
+    continuous_torque: float
+    """What the shipped controllers' launch file gives as the joint's maximum (N m)."""
     inertial: Inertial
 
 
@@ -77,6 +86,8 @@ class _Vector(msgspec.Struct):
 
 
 class _Safety(msgspec.Struct):
+    k_velocity: float
+    k_position: float = 0.0
     soft_lower_right: float | None = None
     soft_upper_right: float | None = None
 
@@ -87,6 +98,9 @@ class _Joint(msgspec.Struct):
     axis: _Vector
     origin_xyz: _Vector
     velocity_limit: _Scalar
+    effort_limit: _Scalar
+    jt_feedforward: _Scalar
+    jt_max_effort: _Scalar
     safety: _Safety
 
 
@@ -147,6 +161,10 @@ def load_arm(side: Side) -> Arm:
             origin=shoulder.value if joint.name == "shoulder_pan" else joint.origin_xyz.value,
             range=_soft_range(joint, side),
             velocity_limit=joint.velocity_limit.value,
+            effort_limit=joint.effort_limit.value,
+            safety_gains=(joint.safety.k_position, joint.safety.k_velocity),
+            feedforward=joint.jt_feedforward.value,
+            continuous_torque=joint.jt_max_effort.value,
             inertial=_carried(file.links, joint.name, side),
         )
         for joint in file.joints

@@ -66,6 +66,7 @@ class FencingEnv:
         self._played = np.empty((_POSE_DIM, 2, UNJUDGED_STEPS, num_envs))
         self.unjudged = 0
         """Steps played and not judged yet."""
+        self._actions = np.empty((2, ACTION_DIM, num_envs))
         self._commands = self.batch.ctrl.reshape(num_envs, 2, _POSE_DIM).transpose(1, 2, 0)
         self.offset_scales = (1.0, 1.0)
         """How many times wider than configured each side's bounds are (``Player.offset_scale``)."""
@@ -134,10 +135,9 @@ class FencingEnv:
 
     def _command(self, antagonist: Float32s, protagonist: Float32s) -> None:
         """Turn actions into the poses that the servos are to reach."""
-        actions = np.empty((2, ACTION_DIM, self.num_envs))
-        actions[0] = antagonist.T
-        actions[1] = protagonist.T
-        offsets = bounded_offset(actions, self._action)
+        self._actions[0] = antagonist.T
+        self._actions[1] = protagonist.T
+        offsets = bounded_offset(self._actions, self._action)
         if self.offset_scales != (1.0, 1.0):
             offsets *= np.array(self.offset_scales)[:, None, None]
         self._commands[:] = desired_pose(offsets, self._tools)
