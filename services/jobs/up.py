@@ -17,7 +17,9 @@ from shared.runtime.files import RunLock
 from shared.runtime.logging import configure_logging
 from shared.runtime.serve import run_id_of, stop_on_signals
 
-ROLES = ("router", "league", "learner", "actor", "recorder", "referee", "policy")
+ROLES = (
+    "router", "league", "learner", "actor", "recorder", "referee", "policy", "robot-io",
+)  # fmt: skip
 SIDED = ("learner", "policy")
 """Roles of which each process belongs to one agent."""
 WRITERS = ("league", "learner")
@@ -71,7 +73,13 @@ def specs(
         taken = sum(spec.name.startswith(f"{node}{role}-") for spec in made)
         name = f"{node}{role}-{agent or taken}"
         command = service_command(
-            role, name=name, run=run, site=site, run_id=run_id, agent=agent, overrides=overrides
+            role.replace("-", "_"),
+            name=name,
+            run=run,
+            site=site,
+            run_id=run_id,
+            agent=agent,
+            overrides=overrides,
         )
         made.append(ProcessSpec(name, command))
     return made

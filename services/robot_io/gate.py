@@ -12,7 +12,8 @@ safety function: the run stop in an operator's hand stays mandatory.
 """
 
 import math
-from typing import Final
+from collections.abc import Iterable
+from typing import Final, NamedTuple
 
 import msgspec
 
@@ -91,6 +92,15 @@ class GateOutput(msgspec.Struct, frozen=True, kw_only=True, gc=False):
 SILENT: Final = GateOutput(command=None)
 
 
+class Check(NamedTuple):
+    """One thing that must be so before a person arms the robot."""
+
+    what: str
+    """Empty for a problem of which there is no good side to tell."""
+    problem: str
+    """Why it is not so; empty when it is."""
+
+
 class Gate:
     """The gate of one robot; holds no state but its limits."""
 
@@ -159,48 +169,66 @@ class Gate:
         """Leave ``tripped`` for ``disarmed`` as a person asks, once the robot is in order."""
         if memory.mode != "tripped":
             return memory, (f"the gate is {memory.mode}, there is nothing to reset",)
-        if reasons := self._faults(inputs):
+        if reasons := _problems(self._robot_checks(inputs)):
             return memory, reasons
         return GateMemory(reason="reset after a trip", commanded_at=memory.commanded_at), ()
 
     def obstacles(self, memory: GateMemory, inputs: GateInputs) -> tuple[str, ...]:
         """Return everything that stands in the way of arming."""
-        cfg, reasons = self.cfg, list(self._faults(inputs))
-        if memory.mode == "tripped":
-            reasons.insert(0, f"the gate has tripped ({memory.reason}): reset it first")
-        elif memory.mode != "disarmed":
-            reasons.insert(0, f"the gate is {memory.mode} already")
-        if not _is_recent(inputs.now, memory.commanded_at, cfg.command_hold):
-            reasons.append(
-                f"no usable command from the policy within {cfg.command_hold:g} s: is it running?"
-            )
-        if not self._is_tracked(inputs):
-            reasons.append(f"the other bat was not tracked within {cfg.tracker_hold:g} s")
-        if not inputs.speed <= cfg.still_speed:
-            reasons.append(
-                f"the robot moves at {inputs.speed:.3f} m/s, over {cfg.still_speed:g} m/s"
-            )
-        if is_pose(inputs.measured) and not self.space.allows(inputs.measured):
-            x, y, z = inputs.measured.position
-            reasons.append(
-                f"the tool at ({x:.2f}, {y:.2f}, {z:.2f}) m, or its bat, is outside its space: "
-                "move the arm by hand"
-            )
-        return tuple(reasons)
+        return _problems(self.checks(memory, inputs))
 
-    def _faults(self, inputs: GateInputs) -> tuple[str, ...]:
-        """Return what of the robot itself is not in order."""
+    def checks(self, memory: GateMemory, inputs: GateInputs) -> tuple[Check, ...]:
+        """Return everything that must be so before arming, and of each why it is not."""
         cfg = self.cfg
-        reasons = list(inputs.problems)
-        if inputs.is_run_stopped:
-            reasons.append("the run stop is pressed")
-        if inputs.are_motors_halted:
-            reasons.append("the motors are halted")
-        if not _is_recent(inputs.now, inputs.state_at, cfg.state_hold):
-            reasons.append(f"no state of the robot within {cfg.state_hold:g} s")
-        if not is_pose(inputs.measured):
-            reasons.append("the tool's measured pose is not a pose")
-        return tuple(reasons)
+        place = ", ".join(f"{number:.2f}" for number in inputs.measured.position)
+        checks = (
+            Check("the gate is disarmed", _why_not_disarmed(memory)),
+            *self._robot_checks(inputs),
+            _check(
+                f"the policy answers (within {cfg.command_hold:g} s)",
+                _is_recent(inputs.now, memory.commanded_at, cfg.command_hold),
+                f"no usable command from the policy within {cfg.command_hold:g} s: is it running?",
+            ),
+            _check(
+                f"the other bat is tracked (within {cfg.tracker_hold:g} s)",
+                self._is_tracked(inputs),
+                f"the other bat was not tracked within {cfg.tracker_hold:g} s",
+            ),
+            _check(
+                f"the robot stands still (at most {cfg.still_speed:g} m/s)",
+                inputs.speed <= cfg.still_speed,
+                f"the robot moves at {inputs.speed:.3f} m/s, over {cfg.still_speed:g} m/s",
+            ),
+        )
+        if not is_pose(inputs.measured):  # which is a reason already
+            return checks
+        inside = _check(
+            "the tool and its bat are inside their space",
+            self.space.allows(inputs.measured),
+            f"the tool at ({place}) m, or its bat, is outside its space: move the arm by hand",
+        )
+        return (*checks, inside)
+
+    def _robot_checks(self, inputs: GateInputs) -> tuple[Check, ...]:
+        """Return what must be in order of the robot itself."""
+        cfg = self.cfg
+        return (
+            *(Check("", problem) for problem in inputs.problems),
+            _check(
+                "the run stop is released", not inputs.is_run_stopped, "the run stop is pressed"
+            ),
+            _check("the motors are on", not inputs.are_motors_halted, "the motors are halted"),
+            _check(
+                f"the robot's state is fresh (within {cfg.state_hold:g} s)",
+                _is_recent(inputs.now, inputs.state_at, cfg.state_hold),
+                f"no state of the robot within {cfg.state_hold:g} s",
+            ),
+            _check(
+                "the tool's measured pose is a pose",
+                is_pose(inputs.measured),
+                "the tool's measured pose is not a pose",
+            ),
+        )
 
     def _hear(self, memory: GateMemory, inputs: GateInputs) -> GateMemory:
         """Take the command if it can be used, and count what cannot."""
@@ -306,6 +334,20 @@ def disarmed(memory: GateMemory, reason: str) -> GateMemory:
 def tripped(memory: GateMemory, reason: str) -> GateMemory:
     """Return the gate shut until a person resets it."""
     return GateMemory(mode="tripped", reason=reason, commanded_at=memory.commanded_at)
+
+
+def _check(what: str, holds: bool, problem: str) -> Check:
+    return Check(what, "" if holds else problem)
+
+
+def _problems(checks: Iterable[Check]) -> tuple[str, ...]:
+    return tuple(check.problem for check in checks if check.problem)
+
+
+def _why_not_disarmed(memory: GateMemory) -> str:
+    if memory.mode == "tripped":
+        return f"the gate has tripped ({memory.reason}): reset it first"
+    return "" if memory.mode == "disarmed" else f"the gate is {memory.mode} already"
 
 
 def _is_recent(now: float, then: float, limit: float) -> bool:

@@ -34,6 +34,8 @@ class RobotState(msgspec.Struct, frozen=True, kw_only=True):
     """Changes when the controller is restarted."""
     problems: tuple[str, ...] = ()
     """What else keeps the robot from being moved."""
+    passed: tuple[str, ...] = ()
+    """What was looked at and is in order, for the list that a person sees before arming."""
 
 
 class RobotLink(Protocol):

@@ -86,6 +86,7 @@ class RobotIo:
         """Whether this tick's command has not gone out yet."""
         self._began_at = now
         self._lateness_ms = 0.0
+        self._answer_ms: float | None = None
         self._robot = parts.link.read(now)
         self._bat = self._robot.bat
         self._tracked = parts.tracker.read(now)
@@ -247,12 +248,14 @@ class RobotIo:
         self._counters["commands_repeated"] += command is None
         before = self._memory
         self._memory, output = self._parts.gate.step(before, inputs)
+        self._answer_ms = None
         if output.command is not None:
             self._commanded = array_of(output.command)
             self._parts.link.write(self._commanded)
             self._counters["commands_sent"] += 1
             if command is not None:
-                self._answer.add(1e3 * (self._clock.now() - self._began_at))
+                self._answer_ms = 1e3 * (self._clock.now() - self._began_at)
+                self._answer.add(self._answer_ms)
         self._counters["commands_clipped"] += output.is_clipped
         self._note(before)
         self._publish_gate(output)
@@ -265,6 +268,7 @@ class RobotIo:
             commanded=self._commanded,
             is_clipped=output.is_clipped,
             lateness_ms=self._lateness_ms,
+            answer_ms=self._answer_ms,
             late_ticks=self._counters["ticks_late"],
         )
         self._bus.publish(GATE, state)
@@ -292,6 +296,8 @@ class RobotIo:
         """Do what a person asks of the gate."""
         before = self._memory
         inputs = self._inputs(self._clock.now(), None)
+        if asked.action == "check":
+            return self._check_gate(inputs)
         reasons: tuple[str, ...] = ()
         if asked.action == "arm":
             self._memory, reasons = self._parts.gate.arm(before, inputs)
@@ -308,6 +314,18 @@ class RobotIo:
         )
         self._note(before)
         return GateReply(accepted=not reasons, mode=self._memory.mode, reasons=reasons)
+
+    def _check_gate(self, inputs: GateInputs) -> GateReply:
+        """Say what must be so before arming; changes nothing."""
+        checks = self._parts.gate.checks(self._memory, inputs)
+        reasons = tuple(check.problem for check in checks if check.problem)
+        passed = tuple(check.what for check in checks if not check.problem)
+        return GateReply(
+            accepted=not reasons,
+            mode=self._memory.mode,
+            reasons=reasons,
+            passed=(*self._robot.passed, *passed),
+        )
 
     def _note(self, before: GateMemory) -> None:
         """Log a change of mode; a gate that shuts lets the robot stay where it is."""

@@ -28,6 +28,13 @@ def test_a_live_bout_is_a_site_of_its_own(tmp_path: Path):
     assert made[3].argv[made[3].argv.index("--agent") + 1] == "protagonist"
 
 
+def test_the_process_that_moves_a_robot_is_a_role(tmp_path: Path):
+    cfg = SiteConfig(processes=("router", "robot-io"))
+    made = specs(cfg, site=tmp_path / "s.toml", run=tmp_path, run_id="r", node="", overrides=[])
+    assert made[1].name == "robot-io-0"
+    assert "services.robot_io" in made[1].argv
+
+
 @pytest.mark.parametrize(
     ("processes", "message"),
     [

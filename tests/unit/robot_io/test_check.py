@@ -1,0 +1,63 @@
+"""The list that a person sees before arming."""
+
+import math
+
+from services.robot_io.poses import Pose
+from tests.unit.robot_io.gates import START, Driven
+from tests.unit.robot_io.looping import Looping
+
+
+def test_everything_that_must_be_so_before_arming_is_listed_and_nothing_changes():
+    loop = Looping().tick(3)
+    before = loop.service.health().state
+    reply = loop.ask("check")
+    assert reply.accepted
+    assert reply.reasons == ()
+    assert reply.passed == (
+        "the gate is disarmed",
+        "the run stop is released",
+        "the motors are on",
+        "the robot's state is fresh (within 0.05 s)",
+        "the tool's measured pose is a pose",
+        "the policy answers (within 0.1 s)",
+        "the other bat is tracked (within 0.1 s)",
+        "the robot stands still (at most 0.02 m/s)",
+        "the tool and its bat are inside their space",
+    )
+    assert loop.service.health().state == before
+    assert loop.ask("arm").accepted
+
+
+def test_what_is_not_so_is_a_reason_and_the_rest_stays_listed():
+    loop = Looping().armed()
+    loop.link.press_run_stop()
+    loop.offset = None
+    loop.tick(15)
+    reply = loop.ask("check")
+    assert not reply.accepted
+    assert reply.mode == "tripped"
+    assert reply.reasons[0].startswith("the gate has tripped (the run stop was pressed)")
+    assert "the run stop is pressed" in reply.reasons
+    assert "no usable command from the policy within 0.1 s: is it running?" in reply.reasons
+    assert "the other bat is tracked (within 0.1 s)" in reply.passed
+    assert loop.ask("arm").reasons == reply.reasons
+
+
+def test_each_thing_is_either_passed_or_a_reason():
+    gate = Driven().step()
+    inputs = gate.inputs(
+        measured=Pose((math.nan, 0.0, 0.0), START.orientation),
+        speed=math.nan,
+        is_tracked=False,
+        are_motors_halted=True,
+        state_at=0.0,
+        problems=("the calibration is too old: repeat it",),
+    )
+    checks = gate.gate.checks(gate.memory, inputs)
+    assert [check.what for check in checks if not check.problem] == [
+        "the gate is disarmed", "the run stop is released", "the policy answers (within 0.1 s)",
+    ]  # fmt: skip
+    assert len([check for check in checks if check.problem]) == 6
+    assert gate.gate.obstacles(gate.memory, inputs) == tuple(
+        check.problem for check in checks if check.problem
+    )
