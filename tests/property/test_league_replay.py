@@ -4,9 +4,12 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from services.jobs.draws import replay as drawn_again
+from services.league.config import LeagueConfig
 from services.league.history import RunState
 from services.league.leases import is_chunk_open
 from services.league.ledger import open_read_only
@@ -30,12 +33,19 @@ STEPS = st.one_of(
     st.tuples(st.just("restart"), st.just(0)),
 )
 
+ROUNDS = LeagueConfig(
+    iterations=1, antagonist_updates=1, protagonist_updates=1, convergence_min_updates=0,
+    evaluation_bouts=0, rounds=2, round_iterations=3, round_antagonist_updates=1,
+    round_protagonist_updates=2, batch_rollouts=4,
+)  # fmt: skip
+"""In phase two after four steps."""
+
 
 class Mess:
     """Does the steps, remembering what was acknowledged."""
 
-    def __init__(self, folder: Path) -> None:
-        self.match = Match(folder, SMALL)
+    def __init__(self, folder: Path, cfg: LeagueConfig) -> None:
+        self.match = Match(folder, cfg)
         self.leases: list[tuple[Lease, str, str]] = []
         self.acknowledged: dict[str, int] = {}
         self.versions: dict[tuple[str, int], str] = {}
@@ -91,9 +101,7 @@ class Mess:
         if state.stage is None:
             self.match.both_start()
         else:
-            stage = state.stage.stage
-            number = state.latest_version(stage.agent) + 1
-            assert self.match.report(stage.agent, number, stage.index).accepted
+            assert self.match.report_next().accepted
 
     def incident(self, number: int) -> None:
         assert self.match.note(number).accepted
@@ -106,13 +114,14 @@ class Mess:
         self.match.restart()
 
 
+@pytest.mark.parametrize("cfg", [SMALL, ROUNDS], ids=["phase-one", "phase-two"])
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(steps=st.lists(STEPS, max_size=60))
 def test_replay_is_the_live_state_and_everything_acknowledged_is_there_once(
-    steps: list[tuple[Any, ...]],
+    cfg: LeagueConfig, steps: list[tuple[Any, ...]]
 ) -> None:
     with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as name:
-        mess = Mess(Path(name))
+        mess = Mess(Path(name), cfg)
         for step in steps:
             mess.do(step)
         state = mess.match.league.state
@@ -124,6 +133,8 @@ def test_replay_is_the_live_state_and_everything_acknowledged_is_there_once(
         versions = [e.event.key for e in entries if e.event.kind == "version"]
         assert len(versions) == len(set(versions))
         assert {f"{agent}:{number}" for agent, number in mess.versions} <= set(versions)
+        for draw in drawn_again(entries)[1]:
+            assert draw.is_replayed
         for record in state.evaluations.values():
             assert sum(record.played) == record.done
         for record in state.stages:

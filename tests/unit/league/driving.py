@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 
 from services.league.config import LeagueConfig
+from services.league.leases import awaits_restart
 from services.league.service import League
 from shared.bus.base import NoAnswer, Refused
 from shared.bus.memory import MemoryBus, MemoryHub
@@ -75,17 +76,20 @@ def metrics(version: int, **changes: Any) -> UpdateMetrics:
     return msgspec.structs.replace(plain, **changes)
 
 
-def version_report(agent: Agent, version: int, stage: int, salt: float = 0.0) -> VersionReport:
-    """Return a learner's report of a new version."""
+def version_report(
+    agent: Agent, version: int, stage: int, salt: float = 0.0, *, restart: bool = False
+) -> VersionReport:
+    """Return a learner's report of a new version; of a policy it went back to for a round."""
     policy = snapshot(agent, version, stage, salt)
+    is_made_of_none = restart or version == 0
     return VersionReport(
         agent=agent,
         policy_version=version,
         stage=stage,
         snapshot=policy.digest,
         payload=np.frombuffer(policy.payload, np.uint8),
-        rollouts=() if version == 0 else (f"{agent}boot:{version}",),
-        metrics=None if version == 0 else metrics(version),
+        rollouts=() if is_made_of_none else (f"{agent}boot:{version}",),
+        metrics=None if is_made_of_none else metrics(version, reward_mean=version * 37 % 11 / 10),
     )
 
 
@@ -175,9 +179,20 @@ class Match:
         """Renew a lease."""
         return self.ask(RENEWAL, LeaseRenewal(actor=actor, boot=boot, lease=lease.lease))
 
-    def report(self, agent: Agent, version: int, stage: int, salt: float = 0.0) -> Any:
+    def report(
+        self, agent: Agent, version: int, stage: int, salt: float = 0.0, *, restart: bool = False
+    ) -> Any:
         """Report a version."""
-        return self.ask(VERSION, version_report(agent, version, stage, salt))
+        return self.ask(VERSION, version_report(agent, version, stage, salt, restart=restart))
+
+    def report_next(self) -> Any:
+        """Report what the learner in turn makes next; at the start of a round, what it goes
+        back to."""
+        record = self.league.state.stage
+        assert record is not None
+        stage = record.stage
+        version = self.league.state.latest_version(stage.agent) + 1
+        return self.report(stage.agent, version, stage.index, restart=awaits_restart(record))
 
     def both_start(self) -> None:
         """Report version 0 of both agents: the first stage begins."""
@@ -200,11 +215,13 @@ class Match:
         """Make updates, with bouts between them, until the stage that runs is over."""
         stage = self.league.state.stage
         assert stage is not None
-        index, agent = stage.stage.index, stage.stage.agent
+        index = stage.stage.index
+        if awaits_restart(stage):
+            assert self.report_next().accepted
         lease = self.lease()
         while (running := self.league.state.stage) is not None and running.stage.index == index:
             self.play(lease)
-            answer = self.report(agent, self.league.state.latest_version(agent) + 1, index)
+            answer = self.report_next()
             assert not isinstance(answer, Refused), answer
             self.clock.advance(1.0)
 
@@ -219,3 +236,5 @@ class Match:
         for _ in range(2 * self.cfg.iterations):
             self.learn_stage()
         self.evaluate()
+        while self.league.state.stage is not None:
+            self.learn_stage()
