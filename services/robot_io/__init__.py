@@ -1,5 +1,5 @@
 """robot_io: the only process that moves a robot, and the gate every command passes.
 
 Reads ``play/<agent>/offset``, ``play/referee`` and ``play/tracker``; answers ``play/arm``; writes
-``play/bats``, ``play/arms``, ``play/gate`` and ``status/robot-io/<name>``.
+``play/bats``, ``play/arms``, ``play/robot``, ``play/gate`` and ``status/robot-io/<name>``.
 """

@@ -24,6 +24,8 @@ class RobotState(msgspec.Struct, frozen=True, kw_only=True):
     """float64[7], shoulder to wrist (rad)."""
     joint_velocities: Floats
     """float64[7] (rad/s)."""
+    joint_efforts: Floats | None = None
+    """float64[7] (N m); None where the robot does not tell."""
     force: float | None = None
     """On the tool (N)."""
     effort_share: float | None = None

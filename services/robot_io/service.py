@@ -11,6 +11,7 @@ from services.robot_io.course import Course, way_home
 from services.robot_io.gate import Gate, GateInputs, GateMemory, GateOutput, disarmed
 from services.robot_io.links import Floats, OtherRobot, PersonBat, RobotLink, RobotState
 from services.robot_io.poses import Pose, is_pose
+from services.robot_io.reporting import report_of
 from services.robot_io.timing import Timing
 from services.robot_io.trackers import Tracker
 from shared.bus.base import Bus, Subscription
@@ -23,7 +24,7 @@ from shared.messages.play import (
     GateRequest,
     GateState,
 )
-from shared.messages.topics import ARM, ARMS, BATS, GATE, OFFSET
+from shared.messages.topics import ARM, ARMS, BATS, GATE, OFFSET, ROBOT
 from shared.policy.action import desired_pose
 from shared.runtime.service import Health
 
@@ -180,6 +181,8 @@ class RobotIo:
         )
         if is_sound:
             self._publish_arms(robot)
+        report = report_of(robot, self._tick, self._bus.boot, now, self._clock.wall_ns())
+        self._bus.publish(ROBOT, report)
 
     def _both_tools(self, robot: RobotState) -> Floats:
         tools = np.zeros((2, 7))
@@ -267,6 +270,7 @@ class RobotIo:
             reason=self._memory.reason,
             commanded=self._commanded,
             is_clipped=output.is_clipped,
+            is_sent=output.command is not None,
             lateness_ms=self._lateness_ms,
             answer_ms=self._answer_ms,
             late_ticks=self._counters["ticks_late"],

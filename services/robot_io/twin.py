@@ -56,6 +56,7 @@ class TwinLink:
             bat=bat,
             joints=positions[ROBOT],
             joint_velocities=velocities[ROBOT],
+            joint_efforts=self._twin.efforts(ROBOT),
             force=self._twin.force(ROBOT),
             effort_share=self._twin.effort_share(ROBOT),
             is_run_stopped=self._is_run_stopped,

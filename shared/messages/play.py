@@ -169,6 +169,8 @@ class GateState(Message, frozen=True, kw_only=True):
     """Pose sent to the robot: position (m), orientation (w x y z), torso frame."""
     is_clipped: bool
     """The command asked for more than the limits allow."""
+    is_sent: bool = False
+    """Whether ``commanded`` went to the robot in this tick."""
     lateness_ms: float
     """Of this tick of the loop."""
     answer_ms: float | None = None

@@ -32,6 +32,7 @@ from shared.messages.play import (
     RefereeState,
     TrackerPose,
 )
+from shared.messages.robot import RobotReport
 from shared.messages.training import (
     PolicyAnnouncement,
     Receipt,
@@ -145,6 +146,10 @@ ARMS = Topic(
     "play/arms", ArmStates, Qos.STREAM, 4 * KIB, "robot_io", "play, recorder",
     "joints of the robots that play",
 )
+ROBOT = Topic(
+    "play/robot", RobotReport, Qos.STREAM, 4 * KIB, "robot_io", "recorder",
+    "forces, efforts and troubles of the robot",
+)
 TRACKER = Topic(
     "play/tracker", TrackerPose, Qos.STREAM, 4 * KIB, "play", "robot_io, recorder",
     "a person's bat, from a page",
@@ -193,6 +198,6 @@ SERVICES: tuple[Service[Any, Any], ...] = (
     ARM,
 )
 TOPICS: tuple[Topic[Any], ...] = (
-    POLICY, SCHEDULE, PROGRESS, STATUS, FRAMES, BATS, ARMS, TRACKER, OFFSET, REFEREE, GATE,
+    POLICY, SCHEDULE, PROGRESS, STATUS, FRAMES, BATS, ARMS, ROBOT, TRACKER, OFFSET, REFEREE, GATE,
     HEART_RATE,
 )  # fmt: skip

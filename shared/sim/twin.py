@@ -137,10 +137,13 @@ class Twin:
         spring = self._stiffness.kp * (held - of[_TOOL : _TOOL + 3])
         return float(np.linalg.norm(spring - self._stiffness.kv * velocity))
 
+    def efforts(self, side: int) -> Float64:
+        """Return float64[7], what the servo puts on a robot's joints (N m)."""
+        return self._data.qfrc_actuator.reshape(-1, JOINTS)[side - (2 - len(self._agents))].copy()
+
     def effort_share(self, side: int) -> float:
         """Return the largest share of its effort limit that a joint of a robot gives."""
-        efforts = self._data.qfrc_actuator.reshape(-1, JOINTS)[side - (2 - len(self._agents))]
-        return float(np.max(np.abs(efforts) / EFFORT_LIMITS))
+        return float(np.max(np.abs(self.efforts(side)) / EFFORT_LIMITS))
 
     def is_finite(self) -> bool:
         """Return whether the physics is still made of numbers."""
