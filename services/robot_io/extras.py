@@ -1,0 +1,49 @@
+"""What runs beside the 100 Hz loop and never holds it up: heart rate and tones.
+
+Nothing here gates safety. Where a device is missing it says so once and the rest goes on; what
+must wait for a device waits on a thread of its own and hands over through a bounded queue.
+"""
+
+from typing import Protocol
+
+from services.robot_io.heart_rate import HeartRateConfig, open_heart_rate
+from services.robot_io.tones import TonesConfig, open_tones
+from shared.bus.base import Bus
+from shared.clock import Clock
+from shared.runtime.serve import ServeArgs
+
+
+class Extra(Protocol):
+    """Something that the loop ticks after its own work."""
+
+    def tick(self, now: float) -> None:
+        """Take and publish what has come; never waits."""
+        ...
+
+    def rates(self) -> dict[str, float]:
+        """Return what it measures, by name with unit."""
+        ...
+
+    def counters(self) -> dict[str, int]:
+        """Return what it has counted since the start."""
+        ...
+
+    @property
+    def problem(self) -> str:
+        """Return why it does not work now; empty when it does."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the device, within a few seconds."""
+        ...
+
+
+def open_extras(args: ServeArgs, bus: Bus, clock: Clock) -> tuple[Extra, ...]:
+    """Return what the site file asks for in ``[heart_rate]`` and ``[tones]``.
+
+    Raises:
+        ConfigError: a value is out of its range, or a recording cannot be read.
+    """
+    heart_rate = open_heart_rate(args.section("heart_rate", HeartRateConfig), bus, clock)
+    tones = open_tones(args.section("tones", TonesConfig), bus, clock)
+    return tuple(extra for extra in (heart_rate, tones) if extra is not None)
