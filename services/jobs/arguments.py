@@ -5,9 +5,8 @@ import datetime
 from collections.abc import Sequence
 from pathlib import Path
 
+from services.jobs.runs import state_of
 from services.jobs.settings import BUDGETS, Settings
-from services.league.history import RunState
-from services.league.ledger import open_read_only
 from services.league.rounds import phase_one_done
 from services.league.sampling import SAMPLERS
 from services.league.schedule import next_event
@@ -144,16 +143,6 @@ def _check_pair(folder: Path, settings: Settings, *, has_run: bool) -> None:
             f"{2 * settings.league.iterations} stages begun); "
             f"finish it with: riposte train --resume --out {folder}"
         )
-
-
-def state_of(folder: Path) -> RunState:
-    """Return the state of the run in a folder.
-
-    Raises:
-        LedgerError: there is none, or its ledger is damaged.
-    """
-    with open_read_only(folder / "league.sqlite") as ledger:
-        return RunState.fold(ledger.replay())
 
 
 def is_over(folder: Path, settings: Settings) -> bool:

@@ -5,8 +5,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from services.league.history import RunState
-from services.league.ledger import open_read_only
+from services.jobs.runs import state_of
 from services.league.snapshots import SnapshotStore
 from shared.errors import ConfigError, SnapshotError
 from shared.messages.training import AGENTS, Agent
@@ -79,10 +78,7 @@ def find_snapshot(text: str) -> Snapshot:
 
 def _latest(run: Path, agent: Agent) -> Snapshot:
     """Return the newest version of an agent in a run."""
-    if not (run / "league.sqlite").exists():
-        raise ConfigError(f"{run} holds no run (no league.sqlite); give the folder of a run")
-    with open_read_only(run / "league.sqlite") as ledger:
-        record = RunState.fold(ledger.replay()).latest(agent)
+    record = state_of(run).latest(agent)
     if record is None:
         raise SnapshotError(f"{run} has no version of the {agent} yet; let it train for a while")
     return unpack(SnapshotStore(run / "snapshots").get(record.ref), record.snapshot)

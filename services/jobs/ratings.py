@@ -8,9 +8,9 @@ from pathlib import Path
 
 import msgspec
 
+from services.jobs.runs import state_of
 from services.jobs.settings import Settings
 from services.jobs.tournament_files import TABLE_FILE
-from services.jobs.tournament_plan import state_of
 from services.jobs.tournament_results import plan_of, standings_of, table_of
 from services.jobs.tournament_words import standings_text
 from shared.errors import ConfigError

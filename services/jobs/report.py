@@ -19,12 +19,11 @@ from services.jobs.pictures import Picture, bout_pictures
 from services.jobs.report_page import Extras, report_page
 from services.jobs.reproduction import HTML, JSON
 from services.jobs.reproduction import write as write_reproduction
+from services.jobs.runs import state_of
 from services.jobs.settings import Settings
 from services.jobs.summary import Facts, Origin, Summary, summarise
 from services.jobs.words import summary_text
 from services.league.history import RunState, StageRecord
-from services.league.ledger import open_read_only
-from shared.errors import ConfigError
 from shared.runtime.build import commit
 from shared.runtime.files import atomic_write
 from shared.telemetry.figures import Panel
@@ -86,10 +85,7 @@ def write_report(folder: Path, *, pictures: bool = True, command: str = "") -> S
     Raises:
         RiposteError: there is no run, its ledger is damaged, or the files cannot be written.
     """
-    if not (folder / "league.sqlite").exists():
-        raise ConfigError(f"{folder} holds no run (no league.sqlite); give the folder of a run")
-    with open_read_only(folder / "league.sqlite") as ledger:
-        state = RunState.fold(ledger.replay())
+    state = state_of(folder)
     site = folder / "config.toml"
     settings = Settings.load(site if site.exists() else None)
     summary = summarise(state, _facts(folder, state, settings, command))

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import msgspec
 
+from services.jobs.runs import state_of
 from services.jobs.styles_page import draw, styles_page
 from services.jobs.styles_summary import (
     WARM_START,
@@ -20,10 +21,8 @@ from services.jobs.styles_summary import (
     analyse,
     cast_of,
 )
-from services.league.history import RunState
-from services.league.ledger import open_read_only
 from services.league.snapshots import SnapshotStore
-from shared.errors import ConfigError, RiposteError
+from shared.errors import RiposteError
 from shared.policy.snapshot import digest_of, unpack
 from shared.runtime.build import commit
 from shared.runtime.files import atomic_write
@@ -66,10 +65,7 @@ def write_styles(folder: Path) -> StylesSummary:
         RiposteError: there is no run or no tournament, it is incomplete, there are too few
             protagonists, or the files cannot be written; nothing is left half-written.
     """
-    if not (folder / "league.sqlite").exists():
-        raise ConfigError(f"{folder} holds no run (no league.sqlite); give the folder of a run")
-    with open_read_only(folder / "league.sqlite") as ledger:
-        state = RunState.fold(ledger.replay())
+    state = state_of(folder)
     table = load(folder / BOUTS)
     cast = cast_of(state, table)
     analysis = analyse(

@@ -18,9 +18,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from services.jobs.processes import StopAsked, run_processes
+from services.jobs.runs import state_of
 from services.jobs.settings import Settings
 from services.jobs.tournament_files import PAGE_FILE, TABLE_FILE, write_results
-from services.jobs.tournament_plan import Plan, Pools, batch_size, check_asked, state_of
+from services.jobs.tournament_plan import Plan, Pools, batch_size, check_asked
 from services.jobs.tournament_results import PLAN_FILE
 from services.jobs.tournament_words import standings_text
 from services.league.events import RunStarted

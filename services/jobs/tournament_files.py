@@ -4,9 +4,9 @@ from pathlib import Path
 
 import msgspec
 
+from services.jobs.runs import state_of
 from services.jobs.settings import Settings
 from services.jobs.tournament_page import tournament_page
-from services.jobs.tournament_plan import state_of
 from services.jobs.tournament_results import (
     Standings,
     Summary,

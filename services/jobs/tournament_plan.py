@@ -8,7 +8,6 @@ import msgspec
 
 from services.league.events import EvaluationPlanned, Pairing
 from services.league.history import RunState
-from services.league.ledger import open_read_only
 from services.league.snapshots import SnapshotStore
 from shared.errors import ConfigError, SnapshotError
 from shared.messages.training import AGENTS, Agent
@@ -162,16 +161,6 @@ class Pools:
             self.players[agent].append(reference)
             if label:
                 self.labels[reference] = label
-
-
-def state_of(folder: Path) -> RunState:
-    """Return what the ledger of a folder says.
-
-    Raises:
-        LedgerError: there is none, it is damaged, or another program's.
-    """
-    with open_read_only(folder / "league.sqlite") as ledger:
-        return RunState.fold(ledger.replay())
 
 
 def batch_size(bouts: int, most: int) -> int:

@@ -21,9 +21,9 @@ from services.jobs.arguments import (
     is_over,
     parse,
     settings_of,
-    state_of,
 )
 from services.jobs.processes import StopAsked, run_processes
+from services.jobs.runs import state_of
 from services.jobs.settings import Settings, TrainConfig
 from services.supervisor import ProcessSpec, service_command
 from shared.bus.base import Bus

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from services.jobs.arguments import state_of
+from services.jobs.runs import state_of
 from services.learner.checkpoint import CheckpointStore
 from shared.messages.training import AGENTS
 from shared.policy.snapshot import unpack

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from services.jobs.runs import state_of
 from services.jobs.serial import SerialRun
 from services.jobs.settings import Settings
 from services.league.events import RunStarted
-from services.league.history import RunState
-from services.league.ledger import Ledger, open_read_only
+from services.league.ledger import Ledger
 from services.league.service import League
 from shared.bus.memory import MemoryHub
 from shared.clock import ManualClock
@@ -27,11 +27,6 @@ ROOT = Path(__file__).resolve().parents[3]
 
 def cuts(folder: Path) -> list[Path]:
     return sorted((folder / "serial").glob("cut-*.safetensors"))
-
-
-def state_of(folder: Path) -> RunState:
-    with open_read_only(folder / "league.sqlite") as ledger:
-        return RunState.fold(ledger.replay())
 
 
 def flip_a_byte(path: Path) -> None:

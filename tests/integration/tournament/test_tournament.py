@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from services.jobs.ratings import bouts_of
-from services.jobs.tournament_plan import state_of
+from services.jobs.runs import state_of
 from services.jobs.tournament_results import standings_of
 from services.league.history import RunState
 from shared.styles.bouts import load

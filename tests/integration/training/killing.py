@@ -13,7 +13,7 @@ import numpy as np
 
 from services.league.events import BoutsPlayed, VersionEntered
 from services.league.ledger import open_read_only
-from shared.errors import LedgerError
+from shared.errors import ConfigError, LedgerError
 from tests.integration.training.training import log_of, state_of, wait_until
 
 IN_TURN = "learner-in-turn"
@@ -30,7 +30,7 @@ def pid_of(folder: Path, name: str) -> int | None:
 
 def learner_in_turn(folder: Path) -> str | None:
     """Return the name of the learner whose stage it is."""
-    with contextlib.suppress(LedgerError):
+    with contextlib.suppress(ConfigError, LedgerError):
         record = state_of(folder).stage
         return f"learner-{record.stage.agent}" if record is not None else None
     return None
@@ -38,7 +38,7 @@ def learner_in_turn(folder: Path) -> str | None:
 
 def progress_of(folder: Path) -> int:
     """Return how many updates have been made and evaluation bouts played."""
-    with contextlib.suppress(LedgerError):  # not there yet, or just being made
+    with contextlib.suppress(ConfigError, LedgerError):  # not there yet, or just being made
         state = state_of(folder)
         return sum(record.updates for record in state.stages) + state.evaluation_done
     return 0

@@ -11,9 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-from services.league.history import RunState
-from services.league.ledger import open_read_only
-from shared.errors import LedgerError
+from services.jobs.runs import state_of
+from shared.errors import ConfigError, LedgerError
 from tests.integration.small import SMALL
 
 X = TypeVar("X")
@@ -111,17 +110,11 @@ def processes_of(folder: Path) -> list[int]:
     return found
 
 
-def state_of(folder: Path) -> RunState:
-    """Return what the ledger says of the run."""
-    with open_read_only(folder / "league.sqlite") as ledger:
-        return RunState.fold(ledger.replay())
-
-
 def updates_of(folder: Path) -> int:
     """Return how many updates the ledger has so far."""
     try:
         return sum(record.updates for record in state_of(folder).stages)
-    except LedgerError:  # not there yet, or just being made
+    except (ConfigError, LedgerError):  # not there yet, or just being made
         return 0
 
 
