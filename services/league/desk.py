@@ -216,6 +216,12 @@ class Desk:
             accepted=not reason,
             latest_version=self._state.latest_version(report.agent),
             stage=schedule.stage_now(self._state),
+            learned_elsewhere=tuple(
+                name
+                for version in self._state.versions[report.agent].values()
+                if version.version >= report.policy_version and version.snapshot != report.snapshot
+                for name in version.rollouts
+            ),
             reason=reason,
         )
 

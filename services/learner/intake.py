@@ -4,6 +4,7 @@ A held rollout is answered only when the learner says that what was made from it
 """
 
 from collections import Counter, deque
+from collections.abc import Sequence
 
 import structlog
 
@@ -143,6 +144,19 @@ class Intake:
         for request, _ in self._committing:
             request.reply(Receipt(accepted=True))
         self._committing = []
+
+    def learned_elsewhere(self, names: Sequence[str]) -> None:
+        """Never learn from these: the ledger has versions made from them that are lost here."""
+        for name in names:
+            boot, _, sequence = name.rpartition(":")
+            if sequence.isdecimal():
+                self.applied.add(boot, int(sequence))
+        known = set(names)
+        for request, rollout in self._gathered:
+            if rollout.name in known:
+                self.counters["rollouts_repeated"] += 1
+                request.reply(Receipt(accepted=True))
+        self._gathered = [held for held in self._gathered if held[1].name not in known]
 
     def release(self, reason: str) -> None:
         """Answer the gathered rollouts: they will not be learned from."""

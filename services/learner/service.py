@@ -172,6 +172,7 @@ class Learner:
         did = False
         for report, receipt in self._reports.pump():
             did = True
+            self._intake.learned_elsewhere(receipt.learned_elsewhere)
             if not receipt.accepted:
                 self._renumber(report, receipt)
                 continue
