@@ -40,6 +40,7 @@ SERVICES = (
     Command("policy", "services.policy.__main__", "plays one side of a live bout"),
     Command("referee", "services.referee.__main__", "scores a live bout"),
     Command("robot-io", "services.robot_io.__main__", "moves a robot, through the safety gate"),
+    Command("page", "services.page.__main__", "a live bout in a browser, and its mouse"),
 )
 COMMANDS = {command.name: command for command in (*JOBS, *SERVICES)}
 

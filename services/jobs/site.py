@@ -32,6 +32,7 @@ DECLARED = {
     "referee": "services.referee.config:RefereeConfig",
     "robot_io": "services.robot_io.config:RobotIoConfig",
     "safety": "services.robot_io.config:SafetyConfig",
+    "page": "services.page.config:PageConfig",
     "train": "services.jobs.settings:TrainConfig",
     "site": "services.jobs.up:SiteConfig",
 }

@@ -8,6 +8,7 @@ import structlog
 
 from services.robot_io.config import RobotIoConfig
 from services.robot_io.course import Course, way_home
+from services.robot_io.extras import Extras
 from services.robot_io.gate import Gate, GateInputs, GateMemory, GateOutput, disarmed
 from services.robot_io.links import Floats, OtherRobot, PersonBat, RobotLink, RobotState
 from services.robot_io.poses import Pose, is_pose
@@ -51,6 +52,8 @@ class Parts(msgspec.Struct, frozen=True, kw_only=True):
     """The robot opposite, if a policy plays there."""
     person: PersonBat | None = None
     """The scene that a person's bat is put into."""
+    extras: Extras = Extras()
+    """What runs beside the loop."""
 
 
 class RobotIo:
@@ -132,6 +135,7 @@ class RobotIo:
                 break
             request.reply(self._ask_gate(request.message))
             did = True
+        self._parts.extras.tick(now)
         return did
 
     def _begin(self, now: float) -> None:
@@ -177,6 +181,8 @@ class RobotIo:
                 tools=tools,
                 is_valid=np.array(is_valid),
                 seconds=self._course.seconds(self._tick, now),
+                tracker_source=tracked.source,
+                tracker_sequence=tracked.sequence,
             ),
         )
         if is_sound:
@@ -344,6 +350,7 @@ class RobotIo:
     def health(self) -> Health:
         """Return the gate's mode, and how late the loop was."""
         waits = self._memory.mode == "holding"
+        extras = self._parts.extras
         return Health(
             state=f"{self._memory.mode}: {self._memory.reason}".rstrip(": "),
             waiting_for=self._memory.reason if waits else "",
@@ -351,9 +358,10 @@ class RobotIo:
                 **self._lateness.percentiles(),
                 **self._answer.percentiles(),
                 **self._parts.link.rates(),
+                **extras.rates(),
             },
-            counters={**self._counters, **self._parts.link.counters()},
-            last_error=self._memory.reason if self._memory.mode == "tripped" else "",
+            counters={**self._counters, **self._parts.link.counters(), **extras.counters()},
+            last_error=self._memory.reason if self._memory.mode == "tripped" else extras.problem,
         )
 
     def close(self) -> None:
@@ -364,6 +372,7 @@ class RobotIo:
         self._offsets.close()
         self._people.close()
         self._course.close()
+        self._parts.extras.close()
 
 
 def pose_of(numbers: Floats) -> Pose:

@@ -51,6 +51,10 @@ class TrackedBat(msgspec.Struct, frozen=True, kw_only=True):
     is_valid: bool
     seen_at: float
     """By our monotonic clock (s)."""
+    source: str = ""
+    """Of the newest ``TrackerPose`` that was heard, empty where there are none."""
+    sequence: int = -1
+    """Of the same."""
 
 
 class Tracker(Protocol):
@@ -156,7 +160,9 @@ class PageTracker:
                 continue
             x, y, z, *turn = (float(number) for number in found.pose)
             self._follower.offer(Pose((x, y, z), (turn[0], turn[1], turn[2], turn[3])), now)
-        return self._follower.read(now)
+        return msgspec.structs.replace(
+            self._follower.read(now), source=self._source, sequence=self._sequence
+        )
 
     def close(self) -> None:
         """Stop listening."""

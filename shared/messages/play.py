@@ -27,6 +27,10 @@ class BatStates(Message, frozen=True, kw_only=True):
     """Whether each bat is tracked; a state that is not is the last that was."""
     seconds: float
     """Game time of the running bout (s); 0 outside one."""
+    tracker_source: str = ""
+    """Of the newest ``TrackerPose`` in the antagonist's state; empty where none is."""
+    tracker_sequence: int = -1
+    """Of the same pose: whoever sent it learns when it was acted on."""
 
 
 class ArmStates(Message, frozen=True, kw_only=True):
