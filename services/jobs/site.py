@@ -32,6 +32,8 @@ DECLARED = {
     "referee": "services.referee.config:RefereeConfig",
     "robot_io": "services.robot_io.config:RobotIoConfig",
     "safety": "services.robot_io.config:SafetyConfig",
+    "heart_rate": "services.robot_io.heart_rate:HeartRateConfig",
+    "tones": "services.robot_io.tones:TonesConfig",
     "page": "services.page.config:PageConfig",
     "train": "services.jobs.settings:TrainConfig",
     "site": "services.jobs.up:SiteConfig",

@@ -7,10 +7,12 @@ import threading
 from collections.abc import Sequence
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import structlog
 
 from services.robot_io.config import RobotIoConfig, SafetyConfig
+from services.robot_io.extras import open_extras
 from services.robot_io.gate import Gate
 from services.robot_io.limits import Blade
 from services.robot_io.service import Parts, RobotIo, pose_of
@@ -34,7 +36,9 @@ def build(args: ServeArgs, bus: Bus, clock: Clock) -> RobotIo:
     cfg = args.section("robot_io", RobotIoConfig)
     safety = args.section("safety", SafetyConfig)
     sim = args.section("sim", SimConfig)
-    return RobotIo(cfg, twin_parts(cfg, safety, sim, bus), sim.control_timestep, bus, clock)
+    parts = twin_parts(cfg, safety, sim, bus)
+    parts = msgspec.structs.replace(parts, extras=open_extras(args, bus, clock))
+    return RobotIo(cfg, parts, sim.control_timestep, bus, clock)
 
 
 def twin_parts(cfg: RobotIoConfig, safety: SafetyConfig, sim: SimConfig, bus: Bus) -> Parts:

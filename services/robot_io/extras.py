@@ -38,7 +38,37 @@ class Extra(Protocol):
         ...
 
 
-def open_extras(args: ServeArgs, bus: Bus, clock: Clock) -> tuple[Extra, ...]:
+class Extras:
+    """All of them as one."""
+
+    def __init__(self, extras: tuple[Extra, ...] = ()) -> None:
+        self._extras = extras
+
+    def tick(self, now: float) -> None:
+        """Take and publish what has come; never waits."""
+        for extra in self._extras:
+            extra.tick(now)
+
+    def rates(self) -> dict[str, float]:
+        """Return what they measure, by name with unit."""
+        return {name: rate for extra in self._extras for name, rate in extra.rates().items()}
+
+    def counters(self) -> dict[str, int]:
+        """Return what they have counted since the start."""
+        return {name: count for extra in self._extras for name, count in extra.counters().items()}
+
+    @property
+    def problem(self) -> str:
+        """Return what does not work now, in one line; empty when all does."""
+        return "; ".join(extra.problem for extra in self._extras if extra.problem)
+
+    def close(self) -> None:
+        """Let go of every device."""
+        for extra in self._extras:
+            extra.close()
+
+
+def open_extras(args: ServeArgs, bus: Bus, clock: Clock) -> Extras:
     """Return what the site file asks for in ``[heart_rate]`` and ``[tones]``.
 
     Raises:
@@ -46,4 +76,4 @@ def open_extras(args: ServeArgs, bus: Bus, clock: Clock) -> tuple[Extra, ...]:
     """
     heart_rate = open_heart_rate(args.section("heart_rate", HeartRateConfig), bus, clock)
     tones = open_tones(args.section("tones", TonesConfig), bus, clock)
-    return tuple(extra for extra in (heart_rate, tones) if extra is not None)
+    return Extras(tuple(extra for extra in (heart_rate, tones) if extra is not None))
