@@ -1,6 +1,7 @@
 """Opponents by reference: scripted ones built, snapshots fetched once and kept by hash."""
 
 from collections import OrderedDict
+from typing import TypeVar
 
 from shared.bus.base import Bus, NoAnswer, Pending, Refused
 from shared.clock import Clock
@@ -11,8 +12,13 @@ from shared.policy.players import SCRIPTED_PREFIX, Player, SnapshotPlayer, scrip
 from shared.policy.scripted.sight import Arena
 from shared.policy.snapshot import Fit, digest_of, reference_of, unpack
 
+X = TypeVar("X")
+
 RETRY_DELAY = 0.5
 """Seconds between a fetch that failed and the next."""
+MOST_FETCHES = 8
+"""Fetches remembered at once; a lease needs two. Those that nobody waits for leave, oldest first:
+their lease ended before the answer came."""
 
 
 class Opponents:
@@ -47,6 +53,11 @@ class Opponents:
         """Return how many policies are kept."""
         return len(self._policies)
 
+    @property
+    def fetches(self) -> int:
+        """Return how many fetches are remembered: under way, or failed and to be tried again."""
+        return len(self._pending.keys() | self._not_before.keys())
+
     def get(self, reference: str, stochastic: bool) -> Player | None:
         """Return the player, or None while it is being fetched.
 
@@ -69,8 +80,12 @@ class Opponents:
         pending = self._pending.get(digest)
         if pending is None:
             if self._clock.now() >= self._not_before.get(digest, float("-inf")):
-                self._pending[digest] = self._bus.ask(
-                    SNAPSHOT, SnapshotRequest(snapshot=reference_of(digest)), self._timeout
+                _remember(
+                    self._pending,
+                    digest,
+                    self._bus.ask(
+                        SNAPSHOT, SnapshotRequest(snapshot=reference_of(digest)), self._timeout
+                    ),
                 )
             return
         answer = pending.take()
@@ -79,7 +94,7 @@ class Opponents:
         del self._pending[digest]
         if isinstance(answer, NoAnswer | Refused) or not answer.found:
             self.last_failure = f"snapshot {digest[:12]}: {answer.reason}"
-            self._not_before[digest] = self._clock.now() + RETRY_DELAY
+            _remember(self._not_before, digest, self._clock.now() + RETRY_DELAY)
             return
         snapshot = unpack(answer.payload.tobytes(), digest)
         snapshot.check_fits(self._fit)
@@ -88,3 +103,11 @@ class Opponents:
         self._policies[digest] = GaussianPolicy(snapshot.weights)
         while len(self._policies) > self._capacity:
             self._policies.popitem(last=False)
+
+
+def _remember(kept: dict[str, X], digest: str, value: X) -> None:
+    """Enter a value as the newest, and let the oldest beyond the number kept leave."""
+    kept.pop(digest, None)
+    kept[digest] = value
+    while len(kept) > MOST_FETCHES:
+        del kept[next(iter(kept))]

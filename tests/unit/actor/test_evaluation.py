@@ -8,7 +8,7 @@ import numpy as np
 import psutil
 
 from services.actor.evaluation import Evaluation
-from services.actor.opponents import Opponents
+from services.actor.opponents import MOST_FETCHES, Opponents
 from shared.bus.memory import MemoryHub
 from shared.clock import ManualClock
 from shared.messages.league import FEATURE_DIM, SnapshotReply
@@ -17,9 +17,10 @@ from shared.messages.training import OBS_DIM
 from shared.policy.mlp import GaussianPolicy
 from shared.policy.players import SnapshotPlayer, StaticPlayer
 from shared.policy.scripted.sight import Arena
+from shared.policy.snapshot import pack
 from shared.styles.features import FEATURES, StyleMeter
 from tests.unit.actor.driving import BOUT_STEPS, WORLDS, worlds
-from tests.unit.policy.making import FIT, snapshot, weights
+from tests.unit.policy.making import FIT, card, snapshot, weights
 
 PLAYERS = (SnapshotPlayer(GaussianPolicy(weights(seed=3)), stochastic=True), StaticPlayer())
 SNAPSHOTS = 500
@@ -81,7 +82,8 @@ def test_memory_does_not_grow_with_the_number_of_opponents_met():
     process = psutil.Process(os.getpid())
     rss: list[int] = []
     for number in range(SNAPSHOTS):
-        made = snapshot(seed=number)
+        policy = weights((128, 128), seed=number)
+        made = pack(card(policy), policy)
         assert opponents.get(made.reference, stochastic=False) is None
         request = league.take()
         assert request is not None
@@ -90,6 +92,35 @@ def test_memory_does_not_grow_with_the_number_of_opponents_met():
         player = opponents.get(made.reference, stochastic=False)
         assert isinstance(player, SnapshotPlayer)
         assert len(opponents) == min(number + 1, CAPACITY)
+        assert opponents.fetches == 0
         rss.append(process.memory_info().rss)
-    grown = rss[-1] - rss[SNAPSHOTS // 5]
-    assert grown < 4 << 20, f"{grown / 1e6:.1f} MB more after {SNAPSHOTS} opponents"
+    met_since = SNAPSHOTS - SNAPSHOTS // 5
+    grown, weight = rss[-1] - rss[SNAPSHOTS // 5], met_since * len(made.payload)
+    assert weight > 30e6
+    assert grown < weight / 4, f"{grown / 1e6:.1f} MB more after {met_since} of {weight / 1e6:.1f}"
+
+
+def test_fetches_that_nobody_waits_for_any_more_are_forgotten():
+    clock = ManualClock(0.0)
+    hub = MemoryHub(clock, max_messages=1024)
+    league = hub.join("league-0").answer(SNAPSHOT)
+    opponents = Opponents(hub.join("actor-0"), clock, FIT, Arena(), CAPACITY, timeout=5.0)
+    lost = SnapshotReply(found=False, payload=np.zeros(0, np.uint8), reason="lost")
+    for number in range(100):
+        made = snapshot(seed=number)
+        assert opponents.get(made.reference, stochastic=False) is None  # and its lease ends
+        request = league.take()
+        assert request is not None
+        if number % 2:
+            request.reply(lost)
+            assert opponents.get(made.reference, stochastic=False) is None
+        clock.advance(0.1)
+        assert opponents.fetches <= 2 * MOST_FETCHES
+    assert opponents.last_failure.endswith("lost")
+    made = snapshot(seed=0)  # and one of those is met again
+    clock.advance(5.0)
+    assert opponents.get(made.reference, stochastic=False) is None
+    request = league.take()
+    assert request is not None
+    request.reply(SnapshotReply(found=True, payload=np.frombuffer(made.payload, np.uint8)))
+    assert opponents.get(made.reference, stochastic=False) is not None
