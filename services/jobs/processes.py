@@ -88,12 +88,12 @@ def run_processes(
     from shared.bus.zenoh import open_zenoh
 
     clock = SystemClock()
-    endpoint = _endpoint(cfg)
+    endpoint = endpoint_of(cfg)
     atomic_write(folder / "endpoint.json", json.dumps({"connect": endpoint, "run": run}).encode())
     supervisor = Supervisor(specs(endpoint), folder / "logs", clock)
     try:
         started = supervisor.start()
-        _wait_for_router(endpoint, supervisor, stop)
+        wait_for_router(endpoint, supervisor, stop)
         bus_cfg = msgspec.structs.replace(cfg, connect=(endpoint,))
         with (
             contextlib.closing(open_zenoh(bus_cfg, job, clock, run)) as bus,
@@ -116,7 +116,7 @@ def run_processes(
         (folder / "endpoint.json").unlink(missing_ok=True)
 
 
-def _endpoint(cfg: BusConfig) -> str:
+def endpoint_of(cfg: BusConfig) -> str:
     """Return where the run's router listens: a free port, or where the site file says.
 
     Raises:
@@ -134,7 +134,7 @@ def _endpoint(cfg: BusConfig) -> str:
     return endpoint
 
 
-def _wait_for_router(endpoint: str, supervisor: Supervisor, stop: threading.Event) -> None:
+def wait_for_router(endpoint: str, supervisor: Supervisor, stop: threading.Event) -> None:
     """Wait until the router accepts a connection.
 
     Raises:

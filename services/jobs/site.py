@@ -35,6 +35,7 @@ DECLARED = {
     "heart_rate": "services.robot_io.heart_rate:HeartRateConfig",
     "tones": "services.robot_io.tones:TonesConfig",
     "page": "services.page.config:PageConfig",
+    "play": "services.jobs.play_config:PlayConfig",
     "train": "services.jobs.settings:TrainConfig",
     "site": "services.jobs.up:SiteConfig",
 }
