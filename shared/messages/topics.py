@@ -33,6 +33,7 @@ from shared.messages.play import (
     TrackerPose,
 )
 from shared.messages.robot import RobotReport
+from shared.messages.tracking import TrackerRaw
 from shared.messages.training import (
     PolicyAnnouncement,
     Receipt,
@@ -154,6 +155,10 @@ TRACKER = Topic(
     "play/tracker", TrackerPose, Qos.STREAM, 4 * KIB, "play", "robot_io, recorder",
     "a person's bat, from a page",
 )
+TRACKER_RAW = Topic(
+    "play/tracker_raw", TrackerRaw, Qos.STREAM, 4 * KIB, "robot_io", "calibrate, recorder",
+    "a Vive tracker in the base stations' frame",
+)
 OFFSET = Topic(
     "play/{agent}/offset", DesiredOffset, Qos.STREAM, 4 * KIB, "policy", "robot_io, recorder",
     "where the tool should go from here",
@@ -198,6 +203,6 @@ SERVICES: tuple[Service[Any, Any], ...] = (
     ARM,
 )
 TOPICS: tuple[Topic[Any], ...] = (
-    POLICY, SCHEDULE, PROGRESS, STATUS, FRAMES, BATS, ARMS, ROBOT, TRACKER, OFFSET, REFEREE, GATE,
-    HEART_RATE,
+    POLICY, SCHEDULE, PROGRESS, STATUS, FRAMES, BATS, ARMS, ROBOT, TRACKER, TRACKER_RAW, OFFSET,
+    REFEREE, GATE, HEART_RATE,
 )  # fmt: skip
