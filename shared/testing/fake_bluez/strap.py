@@ -43,6 +43,8 @@ class FakeBluez:
         self.address = bus_address
         self.connects = 0
         """Connections made."""
+        self.refused = 0
+        """Connections refused."""
         self.is_advertising = True
         """Whether the strap is worn and in reach."""
         self.refuses = False
@@ -79,6 +81,16 @@ class FakeBluez:
                 self._loop.call_soon_threadsafe(ended.set)
         self._thread.join(START_SECONDS)
 
+    @property
+    def is_connected(self) -> bool:
+        """Return whether the strap is connected."""
+        return self._device.is_connected
+
+    @property
+    def is_discovered(self) -> bool:
+        """Return whether somebody looks for straps."""
+        return self._discoveries > 0
+
     def wait_for_listener(self, seconds: float) -> bool:
         """Return whether somebody listens to the measurement within so long."""
         return self._notifying.wait(seconds)
@@ -107,6 +119,7 @@ class FakeBluez:
     def connect(self) -> None:
         """Connect the strap; on the fake's thread."""
         if self.refuses or not self.is_advertising:
+            self.refused += 1
             raise DBusError("org.bluez.Error.Failed", "br-connection-page-timeout")
         self.connects += 1
         self._characteristic = self._new_characteristic()
