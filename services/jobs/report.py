@@ -21,7 +21,8 @@ from services.jobs.reproduction import HTML, JSON
 from services.jobs.reproduction import write as write_reproduction
 from services.jobs.runs import state_of
 from services.jobs.settings import Settings
-from services.jobs.summary import Facts, Origin, Summary, summarise
+from services.jobs.summarise import Facts, summarise
+from services.jobs.summary import Origin, Summary
 from services.jobs.words import summary_text
 from services.league.history import RunState, StageRecord
 from shared.runtime.build import commit

@@ -9,7 +9,8 @@ import pytest
 from services.jobs import report
 from services.jobs.pictures import Moment, caption, choose
 from services.jobs.report import write_report
-from services.jobs.summary import Score, Summary, bins
+from services.jobs.summarise import bins
+from services.jobs.summary import Score, Summary
 from services.jobs.words import clock_text, duration_text, headline, points_text, summary_text
 from services.league.history import CurvePoint
 from shared.errors import ConfigError, LedgerError

@@ -9,7 +9,8 @@ from services.jobs.draws import Draw, fit_of, replay
 from services.jobs.report import write_report
 from services.jobs.reproduction import gather
 from services.jobs.reproduction_parts import Claim, Reproduction
-from services.jobs.summary import Facts, Origin, summarise
+from services.jobs.summarise import Facts, summarise
+from services.jobs.summary import Origin
 from services.league.history import RunState
 from services.league.ledger import open_read_only
 from shared.game.rules import RuleBook
