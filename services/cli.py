@@ -19,6 +19,7 @@ class Command(NamedTuple):
 
 JOBS = (
     Command("play", "services.jobs.play", "fence against the robot, or watch two policies do it"),
+    Command("robot", "services.jobs.robot", "check, arm, disarm or reset the robot"),
     Command("train", "services.jobs.train", "train two fencers on this machine, with a report"),
     Command("tournament", "services.jobs.tournament", "everybody of a run against everybody"),
     Command("ratings", "services.jobs.ratings", "rate the players of a run's tournament"),

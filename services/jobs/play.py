@@ -6,7 +6,6 @@ shows how it goes, and ends with the scores. A real robot is armed on the page o
 """
 
 import contextlib
-import getpass
 import json
 import os
 import sys
@@ -26,6 +25,7 @@ from services.jobs.play_processes import LIVE, processes
 from services.jobs.play_screen import Screen
 from services.jobs.play_summary import PlayedMatch, summary_of, summary_text, write_summary
 from services.jobs.processes import StopAsked, endpoint_of, wait_for_router
+from services.jobs.who import operator
 from services.supervisor import Supervisor
 from shared.bus.zenoh import open_zenoh
 from shared.clock import SystemClock
@@ -84,14 +84,6 @@ def _point_latest_at(folder: Path) -> None:
             temporary = link.with_name(f".{LATEST}.{os.getpid()}")
             temporary.symlink_to(folder.name)
             temporary.replace(link)
-
-
-def operator() -> str:
-    """Return who sits at this terminal."""
-    try:
-        return getpass.getuser()
-    except (OSError, KeyError):  # no name in a container
-        return f"user {os.getuid()}"
 
 
 class Course:

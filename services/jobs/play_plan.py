@@ -28,8 +28,26 @@ from shared.styles.bundle import load_bundle, shipped_bundle
 
 RUNS = Path("runs")
 SUMMARY = "summary.json"
-LAPTOP: tuple[str, ...] = ()
-"""Over the defaults where no site file is given: the values of deploy/play.toml."""
+LAPTOP: tuple[str, ...] = (
+    "robot_io.twin_filter=1.0",
+    "robot_io.twin_delay=0.0",
+    "robot_io.twin_force=60.0",
+    "safety.game_speed=1.0",
+    "safety.acceleration=20.0",
+    "safety.turn_speed=4.0",
+    "safety.turn_acceleration=60.0",
+    "safety.state_hold=0.2",
+    "safety.state_trip=0.5",
+    "safety.command_trip=2.0",
+    "safety.force_trip=100.0",
+    "safety.force_seconds=0.5",
+    "safety.tracking_trip=0.3",
+    "safety.tracking_seconds=1.0",
+    "safety.effort_trip=1.0",
+    "safety.effort_seconds=1.0",
+)
+"""Over the defaults where no site file is given, as in deploy/play.toml: the robot that policies
+were trained on, which answers faster than the real one; nobody can be hurt by a simulated one."""
 HEURISTIC = ("Heuristic", "scripted:heuristic")
 
 
@@ -109,10 +127,15 @@ def plan_of(found: argparse.Namespace) -> Plan:
     """
     site: Path | None = found.site
     words = [*(() if site is not None else LAPTOP), *found.overrides, *_flags(found)]
+    link = load_section(site, "robot_io", RobotIoConfig, words).link
+    if link != "twin" and site is None:
+        raise ConfigError(
+            f"robot_io.link is {link!r}, a real robot: its limits stand in a site file; "
+            "name one, such as deploy/robot.toml"
+        )
     play = load_section(site, "play", PlayConfig, words)
     folder = _folder(found.out)
     antagonist, protagonist = _seats(site, words, play, folder)
-    link = load_section(site, "robot_io", RobotIoConfig, words).link
     if link != "twin" and not antagonist.is_person:
         raise ConfigError(
             f"--antagonist {antagonist.label} is a second simulated robot, and robot_io.link is "

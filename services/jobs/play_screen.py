@@ -46,6 +46,8 @@ class Screen:
         self._due_at = 0.0
         self._events: deque[tuple[float, str]] = deque(maxlen=EVENTS)
         self._live: Live | None = None
+        self._shown = ""
+        """The last plain line about how it stands."""
 
     def __enter__(self) -> "Screen":
         if self._console.is_terminal:
@@ -78,7 +80,10 @@ class Screen:
             self._live.update(self._panel(), refresh=True)
         else:
             self._due_at = now + LINE_PERIOD
-            self._print(line(self._match))
+            text = line(self._match)
+            if text != self._shown:
+                self._print(text)
+            self._shown = text
 
     def say(self, text: str) -> None:
         """Show an event."""
