@@ -32,6 +32,7 @@ DECLARED = {
     "referee": "services.referee.config:RefereeConfig",
     "robot_io": "services.robot_io.config:RobotIoConfig",
     "safety": "services.robot_io.config:SafetyConfig",
+    "vive": "services.robot_io.vive_config:ViveConfig",
     "heart_rate": "services.robot_io.heart_rate:HeartRateConfig",
     "tones": "services.robot_io.tones:TonesConfig",
     "page": "services.page.config:PageConfig",

@@ -4,7 +4,7 @@ import contextlib
 import os
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import msgspec
@@ -13,13 +13,17 @@ import structlog
 
 from services.robot_io.config import RobotIoConfig, SafetyConfig
 from services.robot_io.extras import open_extras
+from services.robot_io.frames import heading
 from services.robot_io.gate import Gate
 from services.robot_io.limits import Blade
+from services.robot_io.poses import Pose
 from services.robot_io.service import Parts, RobotIo, pose_of
 from services.robot_io.trackers import PageTracker, PolicyTracker, ReplayTracker, Tracker
 from services.robot_io.twin import TwinLink
+from services.robot_io.vive_config import ViveConfig
 from shared.bus.base import Bus
 from shared.clock import Clock, SystemClock
+from shared.errors import ConfigError
 from shared.runtime.serve import ServeArgs, open_site_bus, serve_plain
 from shared.runtime.service import StatusReporter
 from shared.sim.config import SimConfig
@@ -27,6 +31,8 @@ from shared.sim.model import FencingModel
 from shared.sim.twin import Twin, command_of
 
 ROLE = "robot-io"
+OpenVive = Callable[[Pose, Pose], Tracker]
+"""Opens a Vive tracker: torso frame in the world, where its bat is shown until it is seen."""
 
 log = structlog.get_logger()
 
@@ -36,12 +42,30 @@ def build(args: ServeArgs, bus: Bus, clock: Clock) -> RobotIo:
     cfg = args.section("robot_io", RobotIoConfig)
     safety = args.section("safety", SafetyConfig)
     sim = args.section("sim", SimConfig)
-    parts = twin_parts(cfg, safety, sim, bus)
+    parts = twin_parts(cfg, safety, sim, bus, vive_of(args, bus, clock))
     parts = msgspec.structs.replace(parts, extras=open_extras(args, bus, clock))
     return RobotIo(cfg, parts, sim.control_timestep, bus, clock)
 
 
-def twin_parts(cfg: RobotIoConfig, safety: SafetyConfig, sim: SimConfig, bus: Bus) -> Parts:
+def vive_of(args: ServeArgs, bus: Bus, clock: Clock) -> OpenVive:
+    """Return what opens the tracker of section ``[vive]``."""
+
+    def open_it(world_from_torso: Pose, start: Pose) -> Tracker:
+        try:
+            from services.robot_io.vive import open_vive  # openvr only where a tracker is wanted
+        except ModuleNotFoundError as error:
+            raise ConfigError(
+                f"tracker = 'vive' needs {error.name}: pip install 'riposte[robot]'"
+            ) from error
+        return open_vive(args.section("vive", ViveConfig), world_from_torso, start, bus, clock)
+
+    return open_it
+
+
+def twin_parts(
+    cfg: RobotIoConfig, safety: SafetyConfig, sim: SimConfig, bus: Bus,
+    open_vive: OpenVive | None = None,
+) -> Parts:  # fmt: skip
     """Return a twin, its gate and whoever plays against it."""
     model = FencingModel.build(sim)
     is_robot = cfg.tracker == "policy"
@@ -62,9 +86,14 @@ def twin_parts(cfg: RobotIoConfig, safety: SafetyConfig, sim: SimConfig, bus: Bu
     elif cfg.tracker == "replay":
         tracker = ReplayTracker.load(Path(cfg.replay))
     else:
-        # Until the page says where the bat is, it stands where a robot's would.
+        # Until somebody says where the bat is, it stands where a robot's would.
         start = Twin(model, command_of(1.0, 0.0), cfg.twin_force, person=False).bat(0)
-        tracker = PageTracker(bus, pose_of(start[:7]))
+        if cfg.tracker == "vive" and open_vive is not None:
+            x, y, z = model.base_position[1]
+            torso = heading((float(x), float(y), float(z)), model.base_yaw[1])
+            tracker = open_vive(torso, pose_of(start[:7]))
+        else:
+            tracker = PageTracker(bus, pose_of(start[:7]))
     return Parts(
         gate=Gate(safety, blade, sim.control_timestep),
         link=link,

@@ -7,7 +7,7 @@ import msgspec
 Vector = tuple[float, float, float]
 
 LinkName = Literal["twin"]
-TrackerName = Literal["policy", "mouse", "replay"]
+TrackerName = Literal["policy", "mouse", "vive", "replay"]
 
 
 class SafetyConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -113,7 +113,8 @@ class RobotIoConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     link: LinkName = "twin"
     """The robot: a simulated one in real time."""
     tracker: TrackerName = "policy"
-    """Who plays against it: a second policy, the mouse of a browser, or a recorded bat."""
+    """Who plays against it: a second policy, the mouse of a browser, a Vive tracker on a person's
+    bat (section ``[vive]``), or a recorded bat."""
     replay: str = ""
     """File of the recorded bat: float64[T, 14] as .npy, a time (s) and 13 numbers each row."""
     answer_wait: float = 0.005

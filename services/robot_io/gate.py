@@ -43,6 +43,8 @@ class GateInputs(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     tracker_at: float
     """When the person's bat was seen last."""
     is_tracked: bool
+    tracker_problem: str = ""
+    """Why it is not, where the tracker knows."""
     is_run_stopped: bool = False
     are_motors_halted: bool = False
     generation: int = 0
@@ -192,7 +194,10 @@ class Gate:
             _check(
                 f"the other bat is tracked (within {cfg.tracker_hold:g} s)",
                 self._is_tracked(inputs),
-                f"the other bat was not tracked within {cfg.tracker_hold:g} s",
+                _because(
+                    f"the other bat was not tracked within {cfg.tracker_hold:g} s",
+                    inputs.tracker_problem,
+                ),
             ),
             _check(
                 f"the robot stands still (at most {cfg.still_speed:g} m/s)",
@@ -297,7 +302,9 @@ class Gate:
         if not _is_recent(now, memory.commanded_at, cfg.command_hold):
             return f"no command for {cfg.command_hold:g} s"
         if not self._is_tracked(inputs):
-            return f"the other bat is not tracked for {cfg.tracker_hold:g} s"
+            return _because(
+                f"the other bat is not tracked for {cfg.tracker_hold:g} s", inputs.tracker_problem
+            )
         return ""
 
     def _is_tracked(self, inputs: GateInputs) -> bool:
@@ -338,6 +345,10 @@ def tripped(memory: GateMemory, reason: str) -> GateMemory:
 
 def _check(what: str, holds: bool, problem: str) -> Check:
     return Check(what, "" if holds else problem)
+
+
+def _because(problem: str, cause: str) -> str:
+    return f"{problem}: {cause}" if cause else problem
 
 
 def _problems(checks: Iterable[Check]) -> tuple[str, ...]:

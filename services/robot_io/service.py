@@ -294,6 +294,7 @@ class RobotIo:
             is_home=is_home,
             tracker_at=tracked.seen_at,
             is_tracked=tracked.is_valid,
+            tracker_problem=tracked.problem,
             is_run_stopped=robot.is_run_stopped,
             are_motors_halted=robot.are_motors_halted,
             generation=robot.generation,
@@ -334,7 +335,7 @@ class RobotIo:
             accepted=not reasons,
             mode=self._memory.mode,
             reasons=reasons,
-            passed=(*self._robot.passed, *passed),
+            passed=(*self._robot.passed, *self._tracked.passed, *passed),
         )
 
     def _note(self, before: GateMemory) -> None:
@@ -350,7 +351,8 @@ class RobotIo:
     def health(self) -> Health:
         """Return the gate's mode, and how late the loop was."""
         waits = self._memory.mode == "holding"
-        extras = self._parts.extras
+        extras, tracker = self._parts.extras, self._parts.tracker
+        problem = self._tracked.problem or extras.problem
         return Health(
             state=f"{self._memory.mode}: {self._memory.reason}".rstrip(": "),
             waiting_for=self._memory.reason if waits else "",
@@ -358,10 +360,16 @@ class RobotIo:
                 **self._lateness.percentiles(),
                 **self._answer.percentiles(),
                 **self._parts.link.rates(),
+                **tracker.rates(),
                 **extras.rates(),
             },
-            counters={**self._counters, **self._parts.link.counters(), **extras.counters()},
-            last_error=self._memory.reason if self._memory.mode == "tripped" else extras.problem,
+            counters={
+                **self._counters,
+                **self._parts.link.counters(),
+                **tracker.counters(),
+                **extras.counters(),
+            },
+            last_error=self._memory.reason if self._memory.mode == "tripped" else problem,
         )
 
     def close(self) -> None:

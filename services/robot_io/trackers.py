@@ -55,6 +55,10 @@ class TrackedBat(msgspec.Struct, frozen=True, kw_only=True):
     """Of the newest ``TrackerPose`` that was heard, empty where there are none."""
     sequence: int = -1
     """Of the same."""
+    problem: str = ""
+    """Why it is not tracked, where the tracker knows."""
+    passed: tuple[str, ...] = ()
+    """What was looked at and is in order, for the list that a person sees before arming."""
 
 
 class Tracker(Protocol):
@@ -62,6 +66,14 @@ class Tracker(Protocol):
 
     def read(self, now: float) -> TrackedBat:
         """Return the bat now."""
+        ...
+
+    def rates(self) -> dict[str, float]:
+        """Return what it measures of itself, by name with unit."""
+        ...
+
+    def counters(self) -> dict[str, int]:
+        """Return what it has counted since the start."""
         ...
 
     def close(self) -> None:
@@ -164,12 +176,35 @@ class PageTracker:
             self._follower.read(now), source=self._source, sequence=self._sequence
         )
 
+    def rates(self) -> dict[str, float]:
+        """Return nothing: the page measures itself."""
+        return {}
+
+    def counters(self) -> dict[str, int]:
+        """Return the poses that were none, or jumps."""
+        return {"tracker_rejected": self._follower.rejected}
+
     def close(self) -> None:
         """Stop listening."""
         self._poses.close()
 
 
-class PolicyTracker:
+class _Exact:
+    """A tracker that measures nothing and loses nothing."""
+
+    def rates(self) -> dict[str, float]:
+        """Return nothing."""
+        return {}
+
+    def counters(self) -> dict[str, int]:
+        """Return nothing."""
+        return {}
+
+    def close(self) -> None:
+        """Nothing to let go of."""
+
+
+class PolicyTracker(_Exact):
     """The robot opposite, which a second policy moves."""
 
     def __init__(self, robot: OtherRobot) -> None:
@@ -179,11 +214,8 @@ class PolicyTracker:
         """Return the simulated bat, exact and always there."""
         return TrackedBat(state=self._robot.read_other()[0], is_valid=True, seen_at=now)
 
-    def close(self) -> None:
-        """Nothing to let go of."""
 
-
-class ReplayTracker:
+class ReplayTracker(_Exact):
     """A recorded bat, from the first read on, over and over."""
 
     def __init__(self, rows: Floats) -> None:
@@ -224,6 +256,3 @@ class ReplayTracker:
         passed = math.fmod(now - self._began_at, last)
         row = int(np.searchsorted(self._times, passed + 1e-9, side="right")) - 1
         return TrackedBat(state=self._states[max(row, 0)], is_valid=True, seen_at=now)
-
-    def close(self) -> None:
-        """Nothing to let go of."""
