@@ -51,9 +51,11 @@ class SocketLoop:
         Raises:
             RosError: it took longer, or the loop is closed; says what.
         """
+        bounded = _within(work, seconds)
         try:
-            future = asyncio.run_coroutine_threadsafe(_within(work, seconds), self._loop)
+            future = asyncio.run_coroutine_threadsafe(bounded, self._loop)
         except RuntimeError as error:
+            bounded.close()
             work.close()
             raise RosError(f"{what}: the ROS node is closed") from error
         try:

@@ -66,7 +66,7 @@ class ServiceClient:
         loop = asyncio.get_running_loop()
         md5 = types.service_md5_of(type_name)
         hello = {"callerid": self._node, "service": service, "type": type_name, "md5sum": md5}
-        await loop.sock_sendall(sock, header(hello) + framed(data))
+        await loop.sock_sendall(sock, header(hello))
         reply = fields_of(await _framed_part(sock, LARGEST_HEADER))
         if "error" in reply:
             raise RosError(f"service {service} refuses: {reply['error'][:200]}")
@@ -75,6 +75,8 @@ class ServiceClient:
                 f"service {service} has md5sum {reply.get('md5sum')}, expected {type_name} "
                 f"with {md5}: is its ROS package another version?"
             )
+        # only now: rospy drops what it receives together with the header
+        await loop.sock_sendall(sock, framed(data))
         is_ok = await received(sock, 1)
         body = await _framed_part(sock, self._largest)
         if is_ok != b"\x01":
