@@ -55,7 +55,7 @@ def rollout(
         first_step=first,
         obs=obs,
         last_obs=generator.normal(0.3, 1.5, (worlds, OBS_DIM)).astype(np.float32),
-        actions=acting.sample(means, noise),
+        actions=np.stack([acting.sample(*step) for step in zip(means, noise, strict=True)]),
         means=means,
         stds=acting.std,
         log_probs=acting.log_prob(noise),
