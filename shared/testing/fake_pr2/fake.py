@@ -84,8 +84,10 @@ class FakePr2:
             undo.callback(self._node.close)
             for namespace, values in shipped_parameters(self.cfg).items():
                 self._node.set_param(f"/{namespace}", values)
-            self._wires = Wires(self._node, self._clock, self.cfg.sim.torso_lift)
+            self._wires = Wires(self._node, self._wall_ns, self.cfg.sim.torso_lift)
             self._robot = Robot(self.cfg, self._wires)
+            self._began_at = self._clock.now()
+            self._lost_seconds = 0.0
             for name in self.cfg.running:
                 if self.load(name):
                     self.switch([name], [])
@@ -93,7 +95,6 @@ class FakePr2:
             self._node.wait_registered(5.0)
             undo.pop_all()
         self._began_at = self._clock.now()
-        self._lost_seconds = 0.0
         self._frozen_at: float | None = None
         self._thread = threading.Thread(target=self._run, name="fake-pr2", daemon=True)
         self._thread.start()
@@ -252,12 +253,20 @@ class FakePr2:
         """Return an instant of the clock on the robot's own time."""
         return now - self._began_at - self._lost_seconds
 
+    def _instant(self) -> float:
+        """Return the robot's own time on the clock."""
+        return self._began_at + self._lost_seconds + self._robot.mechanism.now
+
+    def _wall_ns(self) -> int:
+        """Return the wall clock at the robot's cycle, which may be a little behind."""
+        return self._clock.wall_ns() - int(1e9 * (self._clock.now() - self._instant()))
+
     def _remember(self) -> None:
         mechanism = self._robot.mechanism
         arm = mechanism.arm
         self._moments.append(
             ArmMoment(
-                at=self._began_at + self._lost_seconds + mechanism.now,
+                at=self._instant(),
                 tool=pose_of(arm),
                 velocity=arm.jacobian[:3] @ arm.qd,
                 efforts=mechanism.measured.copy(),

@@ -1,11 +1,10 @@
 """The robot's wires: what it says as ROS messages, and what it is told."""
 
-from collections.abc import Mapping, Set
+from collections.abc import Callable, Mapping, Set
 from typing import Any, Final
 
 import numpy as np
 
-from shared.clock import Clock
 from shared.ros import types
 from shared.ros.node import Node
 from shared.ros.publishing import Publication
@@ -67,16 +66,16 @@ class CartTopics:
 class Wires:
     """Publishes what a robot says; an ``Outlet`` of it."""
 
-    def __init__(self, node: Node, clock: Clock, torso_lift: float) -> None:
+    def __init__(self, node: Node, wall_ns: Callable[[], int], torso_lift: float) -> None:
         """Announce the topics that are there whatever runs.
 
         Args:
             node: the robot's.
-            clock: the robot's.
+            wall_ns: returns the wall clock at the robot's cycle, for the stamps.
             torso_lift: where the torso stands (m).
         """
         self._node = node
-        self._clock = clock
+        self._wall_ns = wall_ns
         self._torso_lift = torso_lift
         self.carts: dict[str, CartTopics] = {}
         self.muted: Set[str] = frozenset()
@@ -171,7 +170,7 @@ class Wires:
         self, joints: Joints, kept: JointStatistics, running: Mapping[str, bool], is_halted: bool
     ) -> None:  # fmt: skip
         """Publish the mechanism, once a second."""
-        now = types.stamp_of(self._clock.wall_ns())
+        now = types.stamp_of(self._wall_ns())
         each = [
             types.new(
                 "pr2_mechanism_msgs/JointStatistics",
@@ -213,7 +212,7 @@ class Wires:
         )
 
     def _header(self, frame: str) -> Any:
-        stamp = types.stamp_of(self._clock.wall_ns())
+        stamp = types.stamp_of(self._wall_ns())
         return types.new("std_msgs/Header", stamp=stamp, frame_id=frame)
 
     def _say(self, topic: Publication, **fields: Any) -> None:
