@@ -5,20 +5,18 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import msgspec
-import numpy as np
 import structlog
 
 from services.robot_io.config import RobotIoConfig, SafetyConfig
 from services.robot_io.extras import open_extras
-from services.robot_io.frames import heading
 from services.robot_io.gate import Gate
-from services.robot_io.limits import Blade
-from services.robot_io.poses import Pose
-from services.robot_io.service import Parts, RobotIo, pose_of
-from services.robot_io.trackers import PageTracker, PolicyTracker, ReplayTracker, Tracker
+from services.robot_io.poses import Pose, pose_of
+from services.robot_io.pr2.config import Pr2Config
+from services.robot_io.scene import OpenVive, blade_of, person_tracker
+from services.robot_io.service import Parts, RobotIo
+from services.robot_io.trackers import PolicyTracker, Tracker
 from services.robot_io.twin import TwinLink
 from services.robot_io.vive_config import ViveConfig
 from shared.bus.base import Bus
@@ -31,8 +29,6 @@ from shared.sim.model import FencingModel
 from shared.sim.twin import Twin, command_of
 
 ROLE = "robot-io"
-OpenVive = Callable[[Pose, Pose], Tracker]
-"""Opens a Vive tracker: torso frame in the world, where its bat is shown until it is seen."""
 
 log = structlog.get_logger()
 
@@ -42,9 +38,30 @@ def build(args: ServeArgs, bus: Bus, clock: Clock) -> RobotIo:
     cfg = args.section("robot_io", RobotIoConfig)
     safety = args.section("safety", SafetyConfig)
     sim = args.section("sim", SimConfig)
-    parts = twin_parts(cfg, safety, sim, bus, vive_of(args, bus, clock))
+    open_vive = vive_of(args, bus, clock)
+    if cfg.link == "pr2":
+        make = pr2_parts_maker()
+        pr2 = args.section("pr2", Pr2Config)
+        parts = make(cfg, pr2, safety, sim, bus, clock, open_vive)
+    else:
+        parts = twin_parts(cfg, safety, sim, bus, open_vive)
     parts = msgspec.structs.replace(parts, extras=open_extras(args, bus, clock))
     return RobotIo(cfg, parts, sim.control_timestep, bus, clock)
+
+
+def pr2_parts_maker() -> Callable[..., Parts]:
+    """Return what opens the link to a PR2; rosbags only where one is wanted.
+
+    Raises:
+        ConfigError: it is not installed.
+    """
+    try:
+        from services.robot_io.pr2.parts import pr2_parts
+    except ModuleNotFoundError as error:
+        raise ConfigError(
+            f"link = 'pr2' needs {error.name}: pip install 'riposte[robot]'"
+        ) from error
+    return pr2_parts
 
 
 def vive_of(args: ServeArgs, bus: Bus, clock: Clock) -> OpenVive:
@@ -73,35 +90,15 @@ def twin_parts(
         model, command_of(cfg.twin_filter, cfg.twin_delay), cfg.twin_force, person=not is_robot
     )
     link = TwinLink(twin)
-    angle = model.parameters.bat.mount_angle
-    blade = Blade(
-        direction=(float(np.cos(angle)), 0.0, float(np.sin(angle))),
-        front=model.bat_front,
-        back=model.bat_back,
-        radius=model.bat_radius,
-    )
-    tracker: Tracker
-    if is_robot:
-        tracker = PolicyTracker(link)
-    elif cfg.tracker == "replay":
-        tracker = ReplayTracker.load(Path(cfg.replay))
-    else:
-        # Until somebody says where the bat is, it stands where a robot's would.
-        start = Twin(model, command_of(1.0, 0.0), cfg.twin_force, person=False).bat(0)
-        if cfg.tracker == "vive" and open_vive is not None:
-            x, y, z = model.base_position[1]
-            torso = heading((float(x), float(y), float(z)), model.base_yaw[1])
-            tracker = open_vive(torso, pose_of(start[:7]))
-        else:
-            tracker = PageTracker(bus, pose_of(start[:7]))
     return Parts(
-        gate=Gate(safety, blade, sim.control_timestep),
+        gate=Gate(safety, blade_of(model), sim.control_timestep),
         link=link,
-        tracker=tracker,
+        tracker=PolicyTracker(link) if is_robot else person_tracker(cfg, model, bus, open_vive),
         home=pose_of(twin.tools()[1]),
         other_home=pose_of(twin.tools()[0]) if is_robot else None,
         other=link if is_robot else None,
         person=None if is_robot else link,
+        put_back=twin.reset,
     )
 
 

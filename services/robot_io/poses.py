@@ -6,6 +6,10 @@ For single poses this is ten times faster than arrays. Quaternions are (w, x, y,
 import math
 from typing import NamedTuple, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
 Vector: TypeAlias = tuple[float, float, float]
 Quaternion: TypeAlias = tuple[float, float, float, float]
 
@@ -115,3 +119,17 @@ def rotated(orientation: Quaternion, vector: Vector) -> Vector:
         b + 2.0 * (z * p - x * r),
         c + 2.0 * (x * q - y * p),
     )
+
+
+def pose_of(numbers: Floats) -> Pose:
+    """Return float64[7] as a pose, its quaternion at unit length where it has one."""
+    x, y, z, *four = (float(number) for number in numbers)
+    size = float(np.linalg.norm(four))
+    if size > 0.5:
+        four = [number / size for number in four]
+    return Pose((x, y, z), (four[0], four[1], four[2], four[3]))
+
+
+def array_of(pose: Pose) -> Floats:
+    """Return a pose as float64[7]."""
+    return np.array([*pose.position, *pose.orientation])

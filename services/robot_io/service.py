@@ -1,6 +1,7 @@
 """The 100 Hz loop: read, check, limit, write, publish; every command passes the gate."""
 
 from collections import OrderedDict
+from collections.abc import Callable
 
 import msgspec
 import numpy as np
@@ -11,7 +12,7 @@ from services.robot_io.course import Course, way_home
 from services.robot_io.extras import Extras
 from services.robot_io.gate import Gate, GateInputs, GateMemory, GateOutput, disarmed
 from services.robot_io.links import Floats, OtherRobot, PersonBat, RobotLink, RobotState
-from services.robot_io.poses import Pose, is_pose
+from services.robot_io.poses import Pose, array_of, is_pose, pose_of
 from services.robot_io.reporting import report_of
 from services.robot_io.timing import Timing
 from services.robot_io.trackers import Tracker
@@ -52,6 +53,8 @@ class Parts(msgspec.Struct, frozen=True, kw_only=True):
     """The robot opposite, if a policy plays there."""
     person: PersonBat | None = None
     """The scene that a person's bat is put into."""
+    put_back: Callable[[], None] | None = None
+    """Puts a simulated robot's arm en garde after a reset, as people do a real one by hand."""
     extras: Extras = Extras()
     """What runs beside the loop."""
 
@@ -314,6 +317,8 @@ class RobotIo:
             self._memory, reasons = self._parts.gate.arm(before, inputs)
         elif asked.action == "reset":
             self._memory, reasons = self._parts.gate.reset(before, inputs)
+            if not reasons and self._parts.put_back is not None:
+                self._parts.put_back()
         else:
             self._memory = disarmed(before, f"disarmed by {asked.operator}")
         log.info(
@@ -381,17 +386,3 @@ class RobotIo:
         self._people.close()
         self._course.close()
         self._parts.extras.close()
-
-
-def pose_of(numbers: Floats) -> Pose:
-    """Return float64[7] as a pose, its quaternion at unit length where it has one."""
-    x, y, z, *four = (float(number) for number in numbers)
-    size = float(np.linalg.norm(four))
-    if size > 0.5:
-        four = [number / size for number in four]
-    return Pose((x, y, z), (four[0], four[1], four[2], four[3]))
-
-
-def array_of(pose: Pose) -> Floats:
-    """Return a pose as float64[7]."""
-    return np.array([*pose.position, *pose.orientation])

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from services.robot_io.poses import Pose
 from tests.unit.robot_io.gates import START, Driven
 from tests.unit.robot_io.looping import Looping
@@ -61,3 +63,22 @@ def test_each_thing_is_either_passed_or_a_reason():
     assert gate.gate.obstacles(gate.memory, inputs) == tuple(
         check.problem for check in checks if check.problem
     )
+
+
+def test_a_reset_puts_a_simulated_arm_back_where_it_may_be_armed():
+    loop = Looping().armed()
+    home = loop.tool[:3].copy()
+    loop.offset = np.array([0.0, 0.0, 0.0375, 0.0, 0.0, 0.0])
+    loop.tick(100)
+    loop.link.press_run_stop()
+    loop.tick(2)
+    assert np.linalg.norm(loop.tool[:3] - home) > 0.05
+    assert not loop.ask("reset").accepted
+    assert np.linalg.norm(loop.tool[:3] - home) > 0.05
+    loop.link.release_run_stop()
+    loop.offset = np.zeros(6)
+    loop.tick(2)
+    assert loop.ask("reset").mode == "disarmed"
+    loop.tick(3)
+    assert np.linalg.norm(loop.tool[:3] - home) < 0.01
+    assert loop.ask("arm").accepted
