@@ -18,6 +18,10 @@ class RecorderConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     """Seconds from one batch of the live bout to the next."""
     file_period: float = 5.0
     """Seconds from one write to the file to the next; a kill loses at most this much."""
+    archive: bool = True
+    """Write live bouts into the run's folder as Parquet."""
+    archive_period: float = 1.0
+    """Seconds from one write of a live bout to the next; a kill loses this and ``live_period``."""
     status_period: float = 5.0
     """Seconds from one point of a service's health curve to the next."""
     bout_steps: int = 2000
@@ -27,7 +31,7 @@ class RecorderConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     file_bouts_mib: int = 1024
     """The file gets no more bouts above this size, only curves and events."""
     min_free_mib: int = 256
-    """The file ends when its disk has less than this left."""
+    """The file ends, and no bout is archived, when the disk has less than this left."""
 
     def __post_init__(self) -> None:
         """Check the ranges.
@@ -39,6 +43,7 @@ class RecorderConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
         _check("frames_per_second", self.frames_per_second, 1.0, 100.0)
         _check("live_period", self.live_period, 0.05, 5.0)
         _check("file_period", self.file_period, 0.1, 60.0)
+        _check("archive_period", self.archive_period, 0.1, 60.0)
         _check("status_period", self.status_period, 0.5, 60.0)
         _check("bout_steps", self.bout_steps, 1, 1_000_000)
         _check("bout_memory_mib", self.bout_memory_mib, 16, 65536)

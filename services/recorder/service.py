@@ -11,6 +11,7 @@ import msgspec
 import structlog
 
 from services.recorder.config import RecorderConfig
+from services.recorder.live import Live, about_of
 from services.recorder.narrator import Narrator
 from services.recorder.playback import Playback
 from shared.bus.base import Bus
@@ -22,6 +23,7 @@ from shared.messages.topics import FRAMES, PROGRESS, SCHEDULE, STATUS
 from shared.runtime.files import MIB, atomic_write
 from shared.runtime.service import Health
 from shared.sim.model import FencingModel
+from shared.telemetry.archive import BoutInfo
 from shared.telemetry.bout import BoutDrawer, BoutRows, draw_scene
 from shared.telemetry.door import VIEWER_FILE, FrontDoor, LiveView
 from shared.telemetry.layout import training_layout
@@ -42,8 +44,9 @@ class Recorder:
     """Draws what it hears into a recording; a service that ticks."""
 
     def __init__(
-        self, cfg: RecorderConfig, bus: Bus, clock: Clock, directory: Path, model: FencingModel
-    ) -> None:
+        self, cfg: RecorderConfig, bus: Bus, clock: Clock, directory: Path, model: FencingModel,
+        about: BoutInfo | None = None,
+    ) -> None:  # fmt: skip
         """Open the file, the ports and the page.
 
         Args:
@@ -52,6 +55,7 @@ class Recorder:
             clock: paces the bout on show.
             directory: folder of the run.
             model: the simulator model the bouts are played in; frames of another are not drawn.
+            about: what the archive says of every live bout; by default only the model.
 
         Raises:
             RiposteError: the folder cannot be written or the viewer cannot be started.
@@ -78,6 +82,10 @@ class Recorder:
         self._live = BoutDrawer(self._recording, scene, "live")
         self._filed = BoutDrawer(self._recording, scene, "file")
         self._file_rows: list[BoutRows] = []
+        self._live_bouts = Live(
+            cfg, bus, clock, directory, model, self._recording, scene,
+            about or about_of(directory, model, {}, ""), self._narrator.say,
+        )  # fmt: skip
         self._frames = bus.subscribe(FRAMES)
         self._progress = bus.subscribe(PROGRESS)
         self._schedule = bus.subscribe(SCHEDULE)
@@ -101,6 +109,7 @@ class Recorder:
             self._bout_due = now + self._cfg.live_period
             self._show_bout(now)
         self._narrator.tick(now)
+        self._live_bouts.tick(now)
         if now >= self._disk_due:
             self._disk_due = now + DISK_PERIOD
             self._look_at_disk()
@@ -121,15 +130,19 @@ class Recorder:
             )
             if there
         ]
+        rates, counters, trouble = self._live_bouts.health()
+        bout = f", bout {self._live_bouts.bout}" if self._live_bouts.bout else ""
         return Health(
-            state="recording: " + (" and ".join(places) or "nothing"),
-            counters=dict(self._counters),
-            last_error=self._last_error,
+            state="recording: " + (" and ".join(places) or "nothing") + bout,
+            rates=rates,
+            counters=self._counters | counters,
+            last_error=self._last_error or trouble,
         )
 
     def close(self) -> None:
         """Write what is held and the footer; take the live view down."""
         self._listen()
+        self._live_bouts.close()
         self._write_bout()
         self._recording.close()
         for subscription in (self._frames, self._progress, self._schedule, self._status):
@@ -138,7 +151,7 @@ class Recorder:
         log.info("recording_closed", rows=self._counters["rows"], file_error=self._last_error)
 
     def _listen(self) -> bool:
-        did = False
+        did = self._live_bouts.listen()
         for _ in range(TAKE_MOST):
             if (frames := self._frames.take()) is None:
                 break
@@ -149,6 +162,7 @@ class Recorder:
                 break
             did = True
             self._narrator.on_status(status)
+            self._live_bouts.on_status(status)
         if (schedule := self._schedule.take()) is not None:
             did = True
             self._narrator.on_schedule(schedule)
@@ -171,6 +185,8 @@ class Recorder:
         self._counters["frames" if shown else "frames_unshown"] += len(frames.steps)
 
     def _show_bout(self, now: float) -> None:
+        if self._live_bouts.is_on:
+            return
         rows = self._playback.due(now, self._clock.wall_ns())
         if (started := self._playback.take_started()) is not None:
             self._narrator.on_bout(started)
@@ -182,9 +198,11 @@ class Recorder:
             self._file_rows.append(rows)
 
     def _write_bout(self) -> None:
+        has_room = self._recording.file_size < self._cfg.file_bouts_mib * MIB
+        self._live_bouts.write(has_room=has_room)
         if self._file_rows:
             rows, self._file_rows = BoutRows.join(self._file_rows), []
-            if self._recording.file_size < self._cfg.file_bouts_mib * MIB:
+            if has_room:
                 self._filed.draw(rows)
 
     def _look_at_disk(self) -> None:
@@ -202,6 +220,7 @@ class Recorder:
                 f"recording.rrd ended early ({self._recording.file_error}); the live view goes on"
             )
             self._file_rows.clear()
+            self._live_bouts.forget_file()
             self._narrator.say("recorder", self._last_error, "ERROR")
             log.warning("recording_file_lost", reason=self._recording.file_error)
 

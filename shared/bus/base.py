@@ -36,6 +36,11 @@ class NoAnswer(Message, frozen=True):
 class Subscription(Protocol[M_co]):
     """Values of one topic that have arrived and were not taken."""
 
+    @property
+    def dropped(self) -> int:
+        """Return how many values of a STREAM topic were thrown away because too many waited."""
+        ...
+
     def take(self) -> M_co | None:
         """Return the next value, or None.
 

@@ -69,6 +69,7 @@ class Values(Generic[Out]):
         self._host = host
         self._topic = topic
         self._on_close = on_close
+        self._dropped = 0
         self._newest = Newest[bytes]() if topic.qos is Qos.LATEST else None
         self._fifo = Fifo[bytes](host.max_messages, host.max_bytes)
 
@@ -76,6 +77,11 @@ class Values(Generic[Out]):
     def max_bytes(self) -> int:
         """Return the longest payload to offer."""
         return self._topic.max_bytes
+
+    @property
+    def dropped(self) -> int:
+        """Return how many values were thrown away because too many waited."""
+        return self._dropped
 
     def offer(self, key: str, boot: str, count: int, payload: bytes) -> None:
         """Keep a value that arrived, unless it did before.
@@ -88,6 +94,7 @@ class Values(Generic[Out]):
         """
         if self._newest is None:
             dropped = self._fifo.push(payload, len(payload))
+            self._dropped += dropped
             self._host.counts.add("dropped_values", dropped)
         elif not self._newest.offer(key, boot, count, payload):
             return

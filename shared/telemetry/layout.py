@@ -13,11 +13,13 @@ WINDOW_SECONDS = 25.0
 
 def training_layout(scene: Scene | None) -> Any:
     """Return the blueprint of a training run; without a scene there is no 3-D view."""
-    tabs = rrb.Tabs(_learning(), _league(), _services(), active_tab=0)
-    side: Any = rrb.Vertical(*_bout_views(), tabs, _log(), row_shares=[1.0, 1.0, 2.7, 1.2])
+    tabs = rrb.Tabs(_learning(), _league(), service_views(), active_tab=0)
+    side: Any = rrb.Vertical(*bout_views(), tabs, event_log(), row_shares=[1.0, 1.0, 2.7, 1.2])
     if scene is None:
-        side = rrb.Vertical(tabs, _log(), row_shares=[3, 1])
-    root = side if scene is None else rrb.Horizontal(_scene(scene), side, column_shares=[1.1, 1])
+        side = rrb.Vertical(tabs, event_log(), row_shares=[3, 1])
+    root = (
+        side if scene is None else rrb.Horizontal(scene_view(scene), side, column_shares=[1.1, 1])
+    )
     return rrb.Blueprint(
         root,
         rrb.BlueprintPanel(state="collapsed"),
@@ -27,7 +29,8 @@ def training_layout(scene: Scene | None) -> Any:
     )
 
 
-def _scene(scene: Scene) -> Any:
+def scene_view(scene: Scene) -> Any:
+    """Return the view of the bout."""
     x, y, z = (float(value) for value in scene.target_centre)
     return rrb.Spatial3DView(
         origin=paths.SCENE,
@@ -43,8 +46,9 @@ def _scene(scene: Scene) -> Any:
     )
 
 
-def _bout_views() -> tuple[Any, Any]:
-    recent = rrb.VisibleTimeRanges(
+def recent_range() -> Any:
+    """Return the time range of what is recent."""
+    return rrb.VisibleTimeRanges(
         [
             rrb.VisibleTimeRange(
                 paths.WALL_TIME,
@@ -53,6 +57,11 @@ def _bout_views() -> tuple[Any, Any]:
             )
         ]
     )
+
+
+def bout_views() -> tuple[Any, Any]:
+    """Return the views of the bout's score and events."""
+    recent = recent_range()
     score = rrb.TimeSeriesView(
         origin=paths.BOUT_SCORE,
         name="Score of this bout",
@@ -65,7 +74,8 @@ def _bout_views() -> tuple[Any, Any]:
     return score, events
 
 
-def _plot(origin: str, name: str, corner: str = "RightTop", **options: Any) -> Any:
+def plot(origin: str, name: str, corner: str = "RightTop", **options: Any) -> Any:
+    """Return a plot of everything under ``origin``."""
     return rrb.TimeSeriesView(
         origin=origin, name=name, plot_legend=rrb.PlotLegend(rrb.Corner2D[corner]), **options
     )
@@ -79,17 +89,17 @@ def _learning() -> Any:
             plot_legend=rrb.PlotLegend(visible=False),
         ),
         rrb.Horizontal(
-            _plot(
+            plot(
                 f"{paths.TRAINING}/explained_variance",
                 "Explained variance",
                 "RightBottom",
                 axis_y=rrb.ScalarAxis(range=(-0.2, 1.0)),
             ),
-            _plot(f"{paths.TRAINING}/approx_kl", "KL per update"),
+            plot(f"{paths.TRAINING}/approx_kl", "KL per update"),
         ),
         rrb.Horizontal(
-            _plot(paths.THROUGHPUT, "Samples per second", "RightBottom"),
-            _plot(f"{paths.TRAINING}/policy_lag_mean", "Policy lag (versions)"),
+            plot(paths.THROUGHPUT, "Samples per second", "RightBottom"),
+            plot(f"{paths.TRAINING}/policy_lag_mean", "Policy lag (versions)"),
         ),
         row_shares=[1.5, 1, 1],
         name="Learning",
@@ -99,24 +109,26 @@ def _learning() -> Any:
 def _league() -> Any:
     return rrb.Vertical(
         rrb.TextDocumentView(origin=paths.LEAGUE_STATE, name="Where the run stands"),
-        _plot(paths.VERSIONS, "Versions in the ledger", "LeftTop"),
+        plot(paths.VERSIONS, "Versions in the ledger", "LeftTop"),
         row_shares=[1.6, 1],
         name="League",
     )
 
 
-def _services() -> Any:
+def service_views() -> Any:
+    """Return the curves of all processes."""
     return rrb.Grid(
-        _plot(f"{paths.SERVICES}/cpu_percent", "CPU (% of a core)"),
-        _plot(f"{paths.SERVICES}/rss_mib", "Memory (MiB)"),
-        _plot(f"{paths.SERVICES}/waiting_seconds", "Waiting (s)"),
-        _plot(f"{paths.SERVICES}/rate", "Rates (per second)"),
+        plot(f"{paths.SERVICES}/cpu_percent", "CPU (% of a core)"),
+        plot(f"{paths.SERVICES}/rss_mib", "Memory (MiB)"),
+        plot(f"{paths.SERVICES}/waiting_seconds", "Waiting (s)"),
+        plot(f"{paths.SERVICES}/rate", "Rates (per second)"),
         grid_columns=2,
         name="Services",
     )
 
 
-def _log() -> Any:
+def event_log() -> Any:
+    """Return the log of events."""
     return rrb.TextLogView(
         origin=paths.LOG,
         name="Events",

@@ -166,6 +166,12 @@ class Recording:
         for stream in self._both(self._curves):
             stream.send_recording_name(name or recording_id)
 
+    def arrange(self, blueprint: Any) -> None:
+        """Lay the page out anew, for every viewer."""
+        streams = (self._file_stream, self._curves, self._bout)
+        for stream in (stream for stream in streams if stream is not None):
+            stream.send_blueprint(blueprint)
+
     def static(self, path: str, *archetypes: Any) -> None:
         """Log what never changes, for every viewer."""
         for stream in self._both(self._curves):
