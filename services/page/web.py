@@ -10,6 +10,7 @@ import contextlib
 import dataclasses
 import http
 import logging
+import os
 import socket
 import threading
 from collections import deque
@@ -137,7 +138,9 @@ class Web:
         return None
 
     def close(self) -> None:
-        """Send the page away and stop serving."""
+        """Send the page away and stop serving; a second time does nothing."""
+        if self._loop.is_closed():
+            return
         with contextlib.suppress(TimeoutError):
             self._call(self._end(), CLOSE_SECONDS)
         self._loop.call_soon_threadsafe(self._loop.stop)
@@ -296,9 +299,11 @@ def _listener(host: str, port: int) -> socket.socket:
     try:
         return socket.create_server((host, port), family=family, backlog=32)
     except OSError as error:
+        number = error.errno or 0
+        reason = os.strerror(number) if number > 0 else error.strerror
         raise ConfigError(
-            f"cannot serve the page on {host}:{port} ({error.strerror or error}): stop what "
-            "listens there, or set page.port to another number"
+            f"cannot serve the page on {host}:{port} ({reason}): stop what listens there, or set "
+            "page.host and page.port to what is free"
         ) from error
 
 
