@@ -8,6 +8,7 @@ goes on where it was stopped. Which bouts are played follows from the seed and t
 import argparse
 import contextlib
 import os
+import shlex
 import sys
 import threading
 from collections.abc import Generator, Mapping, Sequence
@@ -69,10 +70,10 @@ def main(argv: Sequence[str]) -> int:
         )
         if not state.finished:
             with stop_on_signals(deadline=180.0) as stop:
+                again = shlex.join(["riposte", "tournament", *_words(run, found.out)])
                 try:
-                    _play(folder, state, _actors(found.actors, state), stop)
+                    _play(folder, state, _actors(found.actors, state), stop, again)
                 except StopAsked:
-                    again = "riposte tournament " + " ".join(_words(run, found.out))
                     print(f"\nstopped; continue with: {again}")
                     return EXIT_INTERRUPTED
         standings, summary = write_results(folder)
@@ -200,7 +201,7 @@ def _actors(asked: int | None, state: RunState) -> int:
 # -- playing ----------------------------------------------------------------------------------
 
 
-def _play(folder: Path, state: RunState, actors: int, stop: threading.Event) -> None:
+def _play(folder: Path, state: RunState, actors: int, stop: threading.Event, again: str) -> None:
     """Run the processes until every bout is played."""
     settings = Settings.load(folder / "config.toml")
 
@@ -225,7 +226,7 @@ def _play(folder: Path, state: RunState, actors: int, stop: threading.Event) -> 
         folder,
         state.run,
         stop,
-        again="riposte tournament",
+        again=again,
     )
 
 

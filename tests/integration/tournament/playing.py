@@ -9,6 +9,7 @@ from pathlib import Path
 from services.jobs.settings import Settings
 from services.league.config import LeagueConfig
 from services.league.events import RunStarted, StageEnded, StageStarted, VersionEntered
+from services.league.history import RunState
 from services.league.ledger import Ledger
 from shared.messages.league import Stage
 from shared.messages.training import AGENTS
@@ -23,6 +24,8 @@ SMALL = (
     "actor.rollout_steps=20",
     "sim.target_radius=0.45",
 )
+WORDS = ("--bouts", "12", "--players", "scripted:static", "scripted:stab")
+"""What a small tournament is asked for with."""
 
 
 def a_run(folder: Path, *, stages: int = 4) -> Path:
@@ -78,3 +81,11 @@ def tournament(folder: Path, *words: str) -> dict[str, object]:
     done = riposte(["tournament", str(folder), "--json", *words])
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout.splitlines()[-1])
+
+
+def assert_one_opponent_a_bout(found: RunState) -> None:
+    """Every bout in the ledger has one opponent from start to end: that of its lease."""
+    for record in found.evaluations.values():
+        assert sorted(record.number) == list(range(record.planned))
+    for lease in found.leases.values():
+        assert lease.end_reason in ("completed", "lapsed", "superseded", "restarted", "asked_again")

@@ -9,43 +9,20 @@ import pytest
 from services.jobs.ratings import bouts_of
 from services.jobs.runs import state_of
 from services.jobs.tournament_results import standings_of
-from services.league.history import RunState
 from shared.styles.bouts import load
-from tests.integration.tournament.playing import a_run, riposte, tournament
+from tests.integration.tournament.playing import assert_one_opponent_a_bout, riposte, tournament
 from tests.integration.training.training import one_line, processes_of
 
 pytestmark = pytest.mark.zenoh
 
 
-def state(folder: Path) -> RunState:
-    return state_of(folder / "tournament")
-
-
-def one_actor_one_opponent(found: RunState) -> None:
-    """Every bout in the ledger has one opponent from start to end: that of its lease."""
-    for record in found.evaluations.values():
-        assert sorted(record.number) == list(range(record.planned))
-    for lease in found.leases.values():
-        assert lease.end_reason in ("completed", "lapsed", "superseded", "restarted", "asked_again")
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    run = a_run(tmp_path_factory.mktemp("small") / "run")
-    summary = tournament(
-        run, "--bouts", "12", "--actors", "2", "--players", "scripted:static", "scripted:stab"
-    )
-    assert summary["bouts"] == summary["bouts_planned"] == 3 * 3 * 12
-    return run
-
-
 def test_everybody_meets_everybody_of_the_other_side(finished: Path):
-    found = state(finished)
+    found = state_of(finished / "tournament")
     assert found.finished
     assert found.is_tournament
     assert len(found.evaluations) == 9
     assert {record.done for record in found.evaluations.values()} == {12}
-    one_actor_one_opponent(found)
+    assert_one_opponent_a_bout(found)
     assert {lease.grant.actor for lease in found.leases.values()} == {"actor-0", "actor-1"}
     table = load(finished / "tournament" / "bouts.parquet")
     assert [table.label(ref) for ref in table.antagonists] == [
@@ -86,9 +63,9 @@ def test_the_folder_has_page_numbers_and_recording(finished: Path):
 
 
 def test_a_finished_tournament_is_not_played_again(finished: Path):
-    before = state(finished).position
+    before = state_of(finished / "tournament").position
     tournament(finished)
-    assert state(finished).position == before
+    assert state_of(finished / "tournament").position == before
     done = riposte(["tournament", str(finished), "--bouts", "13"])
     assert done.returncode == 2
     assert "begun with --bouts 12, not 13" in one_line(done.stderr)

@@ -1,8 +1,6 @@
 """Whole runs of real processes: to the end, interrupted and resumed, on a full disk."""
 
-import contextlib
 import json
-import shutil
 import signal
 import subprocess
 from collections.abc import Iterator
@@ -10,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.integration.disks import fill, small_disk
 from tests.integration.training.training import (
     ROOT,
     SMALL,
@@ -29,6 +28,13 @@ pytestmark = [pytest.mark.zenoh, pytest.mark.timeout(300)]
 
 LONGER = (*SMALL, "league.antagonist_updates=40", "train.record=false")
 """Long enough to be caught in the middle."""
+
+
+@pytest.fixture
+def disk(tmp_path: Path) -> Iterator[Path]:
+    """Just the room that a run asks for."""
+    with small_disk(tmp_path, 320) as disk:
+        yield disk
 
 
 def test_a_run_ends_with_a_report_and_leaves_no_process(tmp_path: Path) -> None:
@@ -106,12 +112,11 @@ def test_an_interrupted_run_is_resumed_though_its_newest_checkpoint_is_damaged(
     assert newest.name in (folder / "report.html").read_text()
 
 
-def test_a_full_disk_ends_the_run_and_costs_nothing(small_disk: Path) -> None:
-    folder = small_disk / "run"
-    filler = small_disk / "filler"
+def test_a_full_disk_ends_the_run_and_costs_nothing(disk: Path) -> None:
+    folder, filler = disk / "run", disk / "filler"
     with training(folder, overrides=LONGER) as process:
         wait_until(lambda: updates_of(folder) >= 2, process, 200)
-        _fill(filler)
+        fill(filler)
         code, _, err = finish(process, 60)
     assert code == 2, err
     assert "no space left" in one_line(err)
@@ -136,32 +141,3 @@ def _acknowledged(folder: Path) -> set[str]:
         for event in log_of(folder, "actor-0")
         if event["event"] == "rollout_acknowledged"
     }
-
-
-def _fill(path: Path) -> None:
-    """Leave no room on the disk of this path."""
-    with path.open("wb", buffering=0) as file, contextlib.suppress(OSError):
-        while True:
-            file.write(b"\0" * (1 << 20))
-    with path.open("ab", buffering=0) as file, contextlib.suppress(OSError):
-        while True:
-            file.write(b"\0" * 4096)
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A disk with just the room that a run asks for."""
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    mount = shutil.which("mount")
-    if (
-        mount is None
-        or subprocess.run(
-            [mount, "-t", "tmpfs", "-o", "size=320m", "tmpfs", str(disk)], capture_output=True
-        ).returncode
-    ):
-        pytest.skip("needs the right to mount a small disk")
-    try:
-        yield disk
-    finally:
-        subprocess.run(["umount", "--lazy", str(disk)], check=True)
