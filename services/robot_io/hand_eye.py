@@ -202,17 +202,15 @@ def _linear(pairs: _Pairs) -> Floats:
     matrix = np.vstack([np.hstack([stations @ v, eye]) for v in turned])
     right = (pairs.tool[:, :3] - pairs.tracker[:, :3] @ stations.T).ravel()
     places = np.linalg.lstsq(matrix, right, rcond=None)[0]
-    return np.concatenate(
-        [
-            Rotation.from_matrix(stations).as_rotvec(), places[3:],
-            Rotation.from_matrix(mount_back.T).as_rotvec(), places[:3],
-        ]
-    )  # fmt: skip
+    guess = np.zeros(12)
+    guess[:3], guess[3:6] = Rotation.from_matrix(stations).as_rotvec(), places[3:]
+    guess[6:9], guess[9:] = Rotation.from_matrix(mount_back.T).as_rotvec(), places[:3]
+    return guess
 
 
 def _nearest_rotation(matrix: Floats) -> Floats:
     left, _, right = np.linalg.svd(matrix)
-    return np.asarray(left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right, np.float64)
+    return left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
 
 
 def _fit(pairs: _Pairs, guess: Floats) -> Floats:

@@ -13,7 +13,7 @@ from shared.clock import Clock
 
 PERIOD = 0.004
 """A tracker's own stream is 250 Hz; a pose is computed when it is asked for, and has no stamp."""
-RETRY_SECONDS = 2.0
+RETRY_SECONDS = 1.0
 """From one try to reach SteamVR to the next."""
 SEARCH_SECONDS = 1.0
 """The same for a tracker that is not there; also from one look at the battery to the next."""

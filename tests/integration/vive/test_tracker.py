@@ -1,0 +1,253 @@
+"""A tracker in real time: its rate, what is lost and comes back, what is not believed."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from services.robot_io.frames import IDENTITY
+from services.robot_io.trackers import TrackedBat
+from services.robot_io.vive import ViveTracker, open_vive
+from services.robot_io.vive_config import ViveConfig
+from services.robot_io.vive_device import SteamVrError
+from services.robot_io.vive_source import PollThread
+from shared.bus.memory import MemoryHub
+from shared.clock import SystemClock
+from shared.messages.topics import TRACKER_RAW
+from shared.testing.fake_vive.runtime import FakeVive
+from tests.integration.vive.conftest import SERIAL
+from tests.unit.calibration.making import calibration, write
+
+GRIP = 0.1
+"""From the tracker to the bat's frame, along the tracker's z (m)."""
+
+
+class Watched:
+    """A tracker that is read a hundred times a second, as the loop does."""
+
+    def __init__(self, tracker: ViveTracker) -> None:
+        self.tracker = tracker
+        self.seen: list[TrackedBat] = []
+        self.longest = 0.0
+
+    def until(self, condition: Callable[[], bool], seconds: float = 5.0) -> float:
+        """Read until something is so; return how long that took."""
+        began = time.monotonic()
+        while time.monotonic() - began < seconds:
+            before = time.monotonic()
+            self.seen.append(self.tracker.read(before))
+            self.longest = max(self.longest, time.monotonic() - before)
+            if condition():
+                return time.monotonic() - began
+            time.sleep(0.01)
+        raise AssertionError(f"not within {seconds} s: {self.seen[-1]}")
+
+    @property
+    def last(self) -> TrackedBat:
+        return self.seen[-1]
+
+
+@pytest.fixture
+def watched(vive: FakeVive, tmp_path: Path) -> Iterator[Watched]:
+    path = write(tmp_path / "vive.toml", calibration())
+    clock = SystemClock()
+    cfg = ViveConfig(serial=SERIAL, calibration=str(path), mount_position=(0.0, 0.0, GRIP))
+    tracker = open_vive(cfg, IDENTITY, IDENTITY, MemoryHub(clock).join("robot-io-0"), clock)
+    yield Watched(tracker)
+    tracker.close()
+
+
+def at(x: float, y: float = 0.0, z: float = 1.0) -> np.ndarray:
+    matrix = np.eye(4)
+    matrix[:3, 3] = (x, y, z)
+    return matrix
+
+
+def test_poses_come_250_times_a_second_and_make_a_bat(vive: FakeVive, watched: Watched):
+    vive.put(2, SERIAL, at(0.3), battery=0.42)
+    watched.until(lambda: watched.last.is_valid)
+    watched.tracker.rates()
+    watched.until(lambda: len(watched.seen) > 150)
+    rates, counters = watched.tracker.rates(), watched.tracker.counters()
+    assert rates["tracker_polls_per_s"] == pytest.approx(250.0, rel=0.2)
+    assert rates["tracker_battery_percent"] == pytest.approx(42.0)
+    assert rates["tracker_connected"] == 1.0
+    assert watched.last.state[:3] == pytest.approx([0.3, 0.0, 1.0 + GRIP])
+    assert watched.last.problem == ""
+    assert counters["tracker_poses_lost"] == 0
+    assert "mm on poses held out" in watched.last.passed[0]
+
+
+def test_a_bat_that_moves_has_its_speed(vive: FakeVive, watched: Watched):
+    stop = threading.Event()
+
+    def move() -> None:
+        began = time.monotonic()
+        while not stop.wait(0.001):
+            passed = time.monotonic() - began
+            vive.put(2, SERIAL, at(0.5 * np.sin(passed)))
+
+    mover = threading.Thread(target=move)
+    mover.start()
+    try:
+        watched.until(lambda: watched.last.is_valid)
+        watched.until(lambda: len(watched.seen) > 60)
+    finally:
+        stop.set()
+        mover.join()
+    speeds = np.array([bat.state[7] for bat in watched.seen[40:]])
+    assert np.median(speeds) == pytest.approx(0.45, abs=0.08)
+
+
+def test_a_dropout_is_lost_in_a_tenth_of_a_second_and_proven_again_in_a_fifth(
+    vive: FakeVive, watched: Watched
+):
+    vive.put(2, SERIAL, at(0.3))
+    watched.until(lambda: watched.last.is_valid)
+    vive.put(2, SERIAL, at(0.3), result=201)
+    assert watched.until(lambda: not watched.last.is_valid) < 0.16
+    assert "the base stations have lost the tracker" in watched.last.problem
+    assert "(result 201)" in watched.last.problem
+    vive.put(2, SERIAL, at(0.31))
+    took = watched.until(lambda: watched.last.is_valid)
+    assert 0.19 < took < 0.35
+    counters = watched.tracker.counters()
+    assert counters["tracker_dropouts"] == 1
+    assert counters["tracker_bad_poses"] > 10
+
+
+def test_one_that_is_switched_off_is_told_so(vive: FakeVive, watched: Watched):
+    watched.until(lambda: watched.last.is_valid)
+    vive.put(2, SERIAL, is_connected=False, is_valid=False, result=1)
+    watched.until(lambda: not watched.last.is_valid)
+    assert watched.last.problem == f"the tracker {SERIAL} is switched off or out of reach"
+    assert watched.tracker.rates()["tracker_connected"] == 0.0
+
+
+def test_a_jump_is_not_believed_until_it_has_lasted(vive: FakeVive, watched: Watched):
+    vive.put(2, SERIAL, at(0.3))
+    watched.until(lambda: watched.last.is_valid)
+    before = watched.tracker.counters()["tracker_rejected"]
+    vive.put(2, SERIAL, at(0.6))
+    watched.until(lambda: not watched.last.is_valid, 0.5)
+    assert watched.tracker.counters()["tracker_rejected"] == before + 1
+    watched.until(lambda: watched.last.is_valid)
+    assert watched.last.state[0] == pytest.approx(0.6)
+
+
+def test_one_that_flies_off_is_not_there(vive: FakeVive, watched: Watched):
+    watched.until(lambda: watched.last.is_valid)
+    vive.put(2, SERIAL, at(7.0))
+    watched.until(lambda: not watched.last.is_valid)
+    assert watched.tracker.counters()["tracker_flown"] > 0
+
+
+def test_a_wrong_serial_lists_those_that_are_seen_and_one_that_comes_later_is_found(
+    vive: FakeVive, watched: Watched
+):
+    watched.until(lambda: watched.last.is_valid)
+    watched.tracker.close()
+    vive.put(2, "LHR-00000009")
+    clock = SystemClock()
+    cfg = ViveConfig(serial=SERIAL, calibration="none")
+    tracker = open_vive(cfg, IDENTITY, IDENTITY, MemoryHub(clock).join("robot-io-0"), clock)
+    try:
+        late = Watched(tracker)
+        late.until(lambda: bool(late.last.problem))
+        assert late.last.problem == (
+            f"no tracker {SERIAL}; SteamVR sees LHR-00000009 (VIVE Tracker 3.0)"
+        )
+        vive.put(3, SERIAL)
+        late.until(lambda: late.last.problem.startswith("no calibration none"))
+        assert not late.last.is_valid
+        assert "riposte robot calibrate" in late.last.problem
+    finally:
+        tracker.close()
+
+
+def test_raw_poses_are_said_without_a_calibration(vive: FakeVive, tmp_path: Path):
+    vive.put(2, SERIAL, at(0.3, 0.4))
+    clock = SystemClock()
+    hub = MemoryHub(clock)
+    raws = hub.join("bench").subscribe(TRACKER_RAW)
+    cfg = ViveConfig(serial=SERIAL, calibration=str(tmp_path / "none.toml"))
+    tracker = open_vive(cfg, IDENTITY, IDENTITY, hub.join("robot-io-0"), clock)
+    try:
+        uncalibrated = Watched(tracker)
+        heard = []
+        uncalibrated.until(lambda: (raw := raws.take()) is not None and not heard.append(raw))
+        assert heard[0].pose[:3] == pytest.approx([0.3, 0.4, 1.0])
+        assert heard[0].is_valid
+        assert heard[0].serial == SERIAL
+    finally:
+        tracker.close()
+
+
+def test_steamvr_that_ends_is_joined_again_when_it_is_back(vive: FakeVive, watched: Watched):
+    watched.until(lambda: watched.last.is_valid)
+    vive.refuse(121)
+    vive.quit()
+    watched.until(lambda: watched.last.problem.startswith("SteamVR is not running"))
+    assert not watched.last.is_valid
+    vive.refuse(0)
+    watched.until(lambda: watched.last.is_valid)
+    assert watched.tracker.counters()["steamvr_opened"] == 2
+    assert vive.counted()["cleaned"] == 1
+
+
+def test_a_steamvr_that_never_will_do_is_refused_at_once(vive: FakeVive, tmp_path: Path):
+    vive.age()
+    clock = SystemClock()
+    with pytest.raises(SteamVrError, match="update SteamVR"):
+        open_vive(ViveConfig(serial=SERIAL), IDENTITY, IDENTITY, MemoryHub(clock).join("r"), clock)
+    assert not any(thread.name == "vive" for thread in threading.enumerate())
+
+
+def test_the_loop_never_waits_for_steamvr():
+    class Stuck:
+        """A SteamVR that does not answer for a while, then crashes."""
+
+        is_stuck = False
+
+        def open(self) -> str:
+            return "1"
+
+        def find(self, serial: str) -> bool:
+            return True
+
+        def seen(self) -> tuple[str, ...]:
+            return ()
+
+        def poll(self):
+            self.is_stuck = True
+            time.sleep(0.5)
+            raise OSError("gone")
+
+        def battery(self) -> float | None:
+            return None
+
+        def is_ending(self) -> bool:
+            return False
+
+        def close(self) -> None: ...
+
+    from services.robot_io.vive_source import ViveSource
+
+    clock = SystemClock()
+    device = Stuck()
+    source = ViveSource(device, SERIAL, clock)
+    thread = PollThread(source)
+    bus = MemoryHub(clock).join("robot-io-0")
+    cfg = ViveConfig(serial=SERIAL, calibration="none")
+    tracker = ViveTracker(cfg, source, IDENTITY, IDENTITY, bus, clock, thread)
+    try:
+        watched = Watched(tracker)
+        watched.until(lambda: device.is_stuck)
+        watched.until(lambda: "crashed" in watched.last.problem)
+        assert watched.longest < 0.1
+        assert not any(bat.is_valid for bat in watched.seen)
+    finally:
+        tracker.close()
