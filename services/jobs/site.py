@@ -32,6 +32,7 @@ DECLARED = {
     "referee": "services.referee.config:RefereeConfig",
     "robot_io": "services.robot_io.config:RobotIoConfig",
     "safety": "services.robot_io.config:SafetyConfig",
+    "pr2": "services.robot_io.pr2.config:Pr2Config",
     "vive": "services.robot_io.vive_config:ViveConfig",
     "heart_rate": "services.robot_io.heart_rate:HeartRateConfig",
     "tones": "services.robot_io.tones:TonesConfig",

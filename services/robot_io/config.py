@@ -6,7 +6,7 @@ import msgspec
 
 Vector = tuple[float, float, float]
 
-LinkName = Literal["twin"]
+LinkName = Literal["twin", "pr2"]
 TrackerName = Literal["policy", "mouse", "vive", "replay"]
 
 
@@ -111,7 +111,7 @@ class RobotIoConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     """What stands on either side of the 100 Hz loop."""
 
     link: LinkName = "twin"
-    """The robot: a simulated one in real time."""
+    """The robot: a simulated one in real time, or a PR2 (section ``[pr2]``)."""
     tracker: TrackerName = "policy"
     """Who plays against it: a second policy, the mouse of a browser, a Vive tracker on a person's
     bat (section ``[vive]``), or a recorded bat."""
@@ -143,6 +143,11 @@ class RobotIoConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
             value = getattr(self, name)
             if not low <= value <= high:  # also refuses NaN
                 raise ValueError(f"{name} is {value:g}; allowed are {low:g} to {high:g}")
+        if self.link == "pr2" and self.tracker == "policy":
+            raise ValueError(
+                "link is 'pr2' and tracker is 'policy': against a PR2 plays a person; "
+                "tracker may be 'vive', 'mouse' or 'replay'"
+            )
         if (self.tracker == "replay") != bool(self.replay):
             raise ValueError(
                 f"tracker is {self.tracker!r} and replay is {self.replay!r}: "
