@@ -9,9 +9,10 @@ class PlayConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     protagonist: str = ""
     """The robot's player: heuristic, scripted:NAME, a player of the bundle (style-1), the file of
     a snapshot, RUN:protagonist or sha256:HASH; empty takes the first selected one of the bundle."""
-    antagonist: str = "mouse"
+    antagonist: str = ""
     """Who plays against it: mouse, vive or replay (a bat that is tracked), or heuristic,
-    scripted:NAME, a file, RUN:antagonist or sha256:HASH (a second simulated robot)."""
+    scripted:NAME, a file, RUN:antagonist or sha256:HASH (a second simulated robot); empty takes
+    the tracker of robot_io, or the mouse where that is a policy."""
     bouts: int = 0
     """Bouts to play; 0 goes on until it is stopped."""
     rest: float = 5.0
@@ -23,8 +24,6 @@ class PlayConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 
     def __post_init__(self) -> None:
         """Check the ranges."""
-        if not self.antagonist:
-            raise ValueError("antagonist is empty: say mouse, vive, or name a player")
         if not 0 <= self.bouts <= 10_000:
             raise ValueError(f"bouts ({self.bouts}) must be in 0 .. 10000")
         if not 0.0 <= self.rest <= 600.0:

@@ -1,6 +1,7 @@
 """What a command line of `riposte play` asks for: everything read and checked before a start."""
 
 import argparse
+import contextlib
 import datetime
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,7 +10,7 @@ import msgspec
 import tomli_w
 
 from services.jobs.play_config import PlayConfig
-from services.jobs.play_seats import PERSON, Seat, missing_library, seat_of
+from services.jobs.play_seats import PERSON, TRACKERS, Seat, missing_library, seat_of
 from services.jobs.site import section_types
 from services.page.config import PageConfig
 from services.policy.config import PolicyConfig
@@ -127,7 +128,7 @@ def plan_of(found: argparse.Namespace) -> Plan:
     """
     site: Path | None = found.site
     words = [*(() if site is not None else LAPTOP), *found.overrides, *_flags(found)]
-    link = load_section(site, "robot_io", RobotIoConfig, words).link
+    link, tracker = _robot(site, words)
     if link != "twin" and site is None:
         raise ConfigError(
             f"robot_io.link is {link!r}, a real robot: its limits stand in a site file; "
@@ -135,7 +136,8 @@ def plan_of(found: argparse.Namespace) -> Plan:
         )
     play = load_section(site, "play", PlayConfig, words)
     folder = _folder(found.out)
-    antagonist, protagonist = _seats(site, words, play, folder)
+    who = play.antagonist or (tracker if tracker in TRACKERS else TRACKERS[0])
+    antagonist, protagonist = _seats(site, words, who, play.protagonist, folder)
     if link != "twin" and not antagonist.is_person:
         raise ConfigError(
             f"--antagonist {antagonist.label} is a second simulated robot, and robot_io.link is "
@@ -193,8 +195,17 @@ def _folder(out: Path | None) -> Path:
     return out
 
 
+def _robot(site: Path | None, words: Sequence[str]) -> tuple[str, str]:
+    """Return which robot it is, and the tracker that the site file names."""
+    tracker = ""
+    with contextlib.suppress(ConfigError):  # a link that does not go with the default tracker
+        tracker = load_section(site, "robot_io", RobotIoConfig, words).tracker
+    words = [*words, _override("robot_io.tracker", "mouse"), _override("robot_io.replay", "")]
+    return load_section(site, "robot_io", RobotIoConfig, words).link, tracker
+
+
 def _seats(
-    site: Path | None, words: Sequence[str], play: PlayConfig, folder: Path
+    site: Path | None, words: Sequence[str], antagonist: str, protagonist: str, folder: Path
 ) -> tuple[Seat, Seat]:
     """Return both sides, antagonist first."""
     sim = load_section(site, "sim", SimConfig, words)
@@ -210,8 +221,8 @@ def _seats(
             raise SnapshotError(f"{loader.agent}: {error}") from None
 
     return (
-        seat(play.antagonist, Loader("antagonist", fit, arena, folder)),
-        seat(play.protagonist, Loader("protagonist", fit, arena, folder)),
+        seat(antagonist, Loader("antagonist", fit, arena, folder)),
+        seat(protagonist, Loader("protagonist", fit, arena, folder)),
     )
 
 
@@ -244,7 +255,8 @@ def _page(
 
 def _players(chosen: Seat) -> tuple[tuple[str, str], ...]:
     """Return the protagonists to choose from on the page, the chosen one first."""
-    players = {chosen.label: chosen.player}
+    is_heuristic = chosen.player == HEURISTIC[1]
+    players = {HEURISTIC[0] if is_heuristic else chosen.label: chosen.player}
     try:
         loaded = load_bundle(shipped_bundle())
     except SnapshotError:  # there is somebody to play against all the same
@@ -270,6 +282,8 @@ def _assignments(antagonist: Seat, protagonist: Seat, page: PageConfig) -> list[
         "page.players": players,
         "page.pointer": page.pointer,
     }
+    if tracker != "replay":
+        values["robot_io.replay"] = ""
     if not antagonist.is_person:
         values["policy.antagonist"] = antagonist.player
     return [_override(key, value) for key, value in values.items()]
