@@ -197,6 +197,7 @@ def _table(summary: StylesSummary) -> list[str]:
 def _accuracy(whom: str, found: SeparabilityNote) -> list[str]:
     known = found.random_folds
     text = f"{known.share:.1%} [{known.low:.1%}, {known.high:.1%}]"
+    text += f" (by planes {found.linear.share:.1%})"
     if found.by_opponent is not None:
         unseen = found.by_opponent
         text += (

@@ -15,7 +15,7 @@ from shared.styles.features import FEATURES
 from shared.styles.sample import StyleSample
 from shared.styles.selection import Selection
 
-SCHEMA = 1
+SCHEMA = 2
 PROTAGONIST = 1
 """Row of a bout's features."""
 GOAL_ACCURACY = 0.9
@@ -85,7 +85,11 @@ class SeparabilityNote(Frozen, frozen=True, kw_only=True):
     bouts: int
     chance: float
     random_folds: AccuracyNote
+    """By a support vector machine, on bouts held out at random."""
+    linear: AccuracyNote
+    """On the same bouts, by a linear discriminant."""
     by_opponent: AccuracyNote | None
+    """By a linear discriminant, on bouts against an opponent it has not seen."""
 
 
 class MeasureNote(Frozen, frozen=True, kw_only=True):
@@ -324,6 +328,7 @@ def _separability(sample: StyleSample, generator: np.random.Generator) -> Separa
         bouts=found.bouts,
         chance=found.chance,
         random_folds=_accuracy(found.random_folds),
+        linear=_accuracy(found.linear),
         by_opponent=unseen,
     )
 
