@@ -57,13 +57,21 @@ class Fencing:
         sim = SimConfig()
         judge = functools.partial(Scoreboard, 1, rules, bat_of(sim), target_of(sim))
         self.referee = Referee(RefereeConfig(), judge, 0.01, self.hub.join("referee-0"), self.clock)
-        about = about_of(folder, MODEL, {"game": rules, "sim": sim}, "ab" * 32)
-        self.recorder = Recorder(cfg, self.hub.join("rec-0"), self.clock, folder, MODEL, about)
+        self._rules = rules
+        self.replace_recorder(folder, cfg)
         self.said = self.bus.subscribe(topics.REFEREE)
         self.person = person
         self.boot = BOOT
         self.tick = -1
         self.state: RefereeState | None = None
+
+    def replace_recorder(self, folder: Path, cfg: RecorderConfig = ONLY_FILE) -> None:
+        """Start a recorder; one that was there must have been closed."""
+        folder.mkdir(parents=True, exist_ok=True)
+        sections = {"game": self._rules, "sim": SimConfig()}
+        about = about_of(folder, MODEL, sections, "ab" * 32)
+        bus = self.hub.join("recorder-0")
+        self.recorder = Recorder(cfg, bus, self.clock, folder, MODEL, about)
 
     def bring(self, bats: np.ndarray, *, lost: bool = False, valid: bool = True) -> None:
         """Let one tick pass; a lost one says nothing."""
@@ -81,8 +89,8 @@ class Fencing:
         phase = tick / 100.0
         say = self.bus.publish
         say(topics.BATS, BatStates(
-            tick=tick, boot=boot, at_ns=now, bats=bats, tools=TOOLS, is_valid=np.array([valid, True]),
-            seconds=0.0,
+            tick=tick, boot=boot, at_ns=now, bats=bats, tools=TOOLS,
+            is_valid=np.array([valid, True]), seconds=0.0,
         ))  # fmt: skip
         joints = MODEL.en_garde + 0.1 * np.sin(phase)
         if self.person:
