@@ -60,7 +60,7 @@ class Ledger:
         with _explained(self.path):
             connection = sqlite3.connect(self.path, timeout=BUSY_TIMEOUT, isolation_level=None)
             try:
-                if not connection.execute("SELECT 1 FROM sqlite_master LIMIT 1").fetchone():
+                if not _is_made(connection):
                     _create(connection)
                 _check(connection, self.path)
                 connection.execute("PRAGMA synchronous = FULL")
@@ -152,7 +152,10 @@ class Ledger:
 
 
 class LedgerReader:
-    """A ledger opened to be read, while the league may be writing it."""
+    """A ledger opened to be read, while the league may be writing it.
+
+    One that is only being made, or whose league was stopped then, has no events.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -161,7 +164,10 @@ class LedgerReader:
         with _explained(path):
             self._connection = _connect_read_only(path)
             try:
-                _check(self._connection, path)
+                # The league makes the file, and in one transaction everything in it.
+                self._is_made = _is_made(self._connection)
+                if self._is_made:
+                    _check(self._connection, path)
             except BaseException:
                 self._connection.close()
                 raise
@@ -172,7 +178,7 @@ class LedgerReader:
         Raises:
             LedgerError: the file is damaged, or a newer Riposte wrote it.
         """
-        return _read(self._connection, self.path)
+        return _read(self._connection, self.path) if self._is_made else iter(())
 
     def close(self) -> None:
         """Close the file."""
@@ -207,6 +213,10 @@ def _connect_read_only(path: Path) -> sqlite3.Connection:
             raise
         connection = sqlite3.connect(f"{uri}?mode=ro&immutable=1", uri=True)
     return connection
+
+
+def _is_made(connection: sqlite3.Connection) -> bool:
+    return connection.execute("SELECT 1 FROM sqlite_master LIMIT 1").fetchone() is not None
 
 
 def _create(connection: sqlite3.Connection) -> None:

@@ -5,6 +5,7 @@ import shutil
 import sqlite3
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -209,6 +210,47 @@ def test_a_missing_ledger_is_not_made_by_a_reader(tmp_path: Path) -> None:
     with pytest.raises(LedgerError, match="there is no ledger"):
         open_read_only(tmp_path / "l")
     assert not list(tmp_path.iterdir())
+
+
+def _nothing(path: Path) -> None:
+    path.touch()
+
+
+def _only_a_header(path: Path) -> None:
+    with contextlib.closing(sqlite3.connect(path)) as connection:
+        connection.execute("PRAGMA journal_mode = WAL")
+
+
+@pytest.mark.parametrize("stopped", [_nothing, _only_a_header])
+def test_a_ledger_whose_making_was_stopped_has_no_events_and_is_made_again(
+    tmp_path: Path, stopped: Callable[[Path], None]
+) -> None:
+    path = tmp_path / "l"
+    stopped(path)
+    with open_read_only(path) as reader:
+        assert list(reader.replay()) == []
+    Ledger(path).close()
+    with open_read_only(path) as reader:
+        assert list(reader.replay()) == []
+
+
+def test_a_reader_that_comes_while_it_is_made_finds_no_fault(tmp_path: Path) -> None:
+    paths = [tmp_path / str(number) for number in range(60)]
+
+    def make() -> None:
+        for path in paths:
+            Ledger(path).close()
+
+    maker = threading.Thread(target=make)
+    maker.start()
+    early = 0
+    for path in paths:
+        while not path.exists():
+            early += 1
+        with open_read_only(path) as reader:
+            assert list(reader.replay()) == []
+    maker.join()
+    assert early
 
 
 def test_what_did_not_fit_is_not_in_the_ledger(tmp_path: Path) -> None:
