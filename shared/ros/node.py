@@ -161,6 +161,14 @@ class Node:
         except (OSError, MessageError) as error:
             raise RosError(f"service {service}: {error}") from error
 
+    def locate(self, service: str, timeout: float = MASTER_SECONDS) -> None:
+        """Ask the master where a service is, so that a later call need not.
+
+        Raises:
+            RosError: the master does not answer, or there is no such service.
+        """
+        self._wait(self._client.locate(service), timeout, f"service {service}")
+
     def serve(self, service: str, type_name: str, handler: Handler) -> Service:
         """Answer a service.
 

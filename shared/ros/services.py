@@ -43,9 +43,17 @@ class ServiceClient:
             with contextlib.suppress(ConnectionRefusedError):
                 return await self._exchange(service, type_name, place, data)
             del self._places[service]
+        return await self._exchange(service, type_name, await self.locate(service), data)
+
+    async def locate(self, service: str) -> tuple[str, int]:
+        """Return where the master says that a service is, and remember it.
+
+        Raises:
+            RosError: the master does not answer, or knows of none.
+        """
         uri = await ask(self._master_uri, "lookupService", self._node, service)
         self._places[service] = place = place_of(str(uri))
-        return await self._exchange(service, type_name, place, data)
+        return place
 
     async def _exchange(
         self, service: str, type_name: str, place: tuple[str, int], data: bytes

@@ -214,11 +214,9 @@ class Pr2Link:
             if self._cart is None:
                 return [node.problem]  # of what the rest only follows
             return [node.problem, *self._own_problems(now)]
-        problems = self._own_problems(now)
-        if now - seen.at <= LISTED_SECONDS:
-            problems += seen.problems
-        else:
-            problems += seen.problems or ("the controllers were not listed for a while",)
+        problems = [*self._own_problems(now), *seen.problems]
+        if now - seen.at > LISTED_SECONDS:
+            problems.append(seen.failure or "nobody asks for the controllers any more")
         return problems
 
     def _own_problems(self, now: float) -> list[str]:

@@ -4,6 +4,7 @@ Two threads, so that an order to hold never waits for a question. They hand over
 that are replaced whole, so the loop reads without a lock.
 """
 
+import contextlib
 import threading
 from collections.abc import Sequence
 from typing import Any, Final
@@ -43,7 +44,9 @@ class Seen(msgspec.Struct, frozen=True, kw_only=True):
 
     at: float = -1e9
     """When the controllers were listed last, by our monotonic clock (s)."""
-    problems: tuple[str, ...] = ("the controllers have not been listed yet",)
+    failure: str = "the controllers have not been listed yet"
+    """Why the last question was not answered; empty if it was."""
+    problems: tuple[str, ...] = ()
     passed: tuple[str, ...] = ()
     starts: int = 0
     """How often the controller was seen to run after it did not."""
@@ -95,6 +98,7 @@ class Poller:
         self._acting: dict[str, bool] = {}
         """Whether a controller acts on the arm, by name."""
         self._commanders: tuple[str, ...] = ()
+        self._wrong = [f"the parameters of {cfg.controller} have not been read yet"]
         self._was_running = True
         self._polls = 0
         self._said: tuple[str, ...] = ()
@@ -108,47 +112,58 @@ class Poller:
         self._thread.join(CLOSE_SECONDS)
 
     def _run(self) -> None:
-        due, asked, passed = -1e9, ("the controllers have not been listed yet",), ()
+        due, asked = -1e9, Seen()
         while not self._stop.wait(DIAGNOSTICS_SECONDS):
-            now = self._clock.now()
             self._hear_diagnostics()
-            at, starts = self.seen.at, self.seen.starts
-            if now >= due:
-                due = now + POLL_SECONDS
+            if self._clock.now() >= due:
+                due = self._clock.now() + POLL_SECONDS
                 try:
-                    found, passed, starts = self._ask(starts)
-                    at, asked = self._clock.now(), found
+                    asked = self._ask(asked)
                 except RosError as error:
                     self.failures += 1
-                    asked, passed = (str(error),), ()
+                    asked = msgspec.structs.replace(asked, failure=str(error))
             errors = self._diagnostics.problems(self._clock.now())
-            self.seen = Seen(at=at, problems=(*asked, *errors), passed=passed, starts=starts)
-            self._say(self.seen.problems)
+            self.seen = msgspec.structs.replace(asked, problems=(*asked.problems, *errors))
+            self._say(self.seen)
 
-    def _ask(self, starts: int) -> tuple[tuple[str, ...], tuple[str, ...], int]:
+    def _ask(self, before: Seen) -> Seen:
         """Return what is wrong, what is not, and how often the controller was seen to start."""
         cfg, node = self._cfg, self._node
         running = running_controllers(node)
+        self._acting = {name: acts for name, acts in self._acting.items() if name in running}
         on_arm = [name for name, runs in running.items() if runs and self._acts(name)]
         problems = controller_problems(cfg.controller, running, on_arm)
         is_running = running.get(cfg.controller, False)
-        starts += is_running and not self._was_running
+        starts = before.starts + (is_running and not self._was_running)
         self._was_running = is_running
-        parameters = node.param(f"/{cfg.controller}")
-        wrong = parameter_problems(parameters, cfg, self._joints, self._efforts)
-        if self._polls % GRAPH_POLLS == 0:
-            self._commanders = node.publishers_of(f"/{cfg.controller}/command_pose")
-        self._polls += 1
+        with contextlib.suppress(RosError):  # a master that is away says nothing of the controllers
+            self._ask_master()
         others = [name for name in self._commanders if name != node.name]
         rivals = [f"{' and '.join(others)} also commands /{cfg.controller}: end it"] * bool(others)
         passed: list[str] = []
         if not problems:
             passed.append(f"{cfg.controller} runs, alone on the arm")
-        if not wrong:
+        if not self._wrong:
             passed.append(f"the parameters of {cfg.controller} are as expected")
         if not rivals:
             passed.append(f"nobody else commands {cfg.controller}")
-        return (*problems, *wrong, *rivals), tuple(passed), starts
+        return Seen(
+            at=self._clock.now(),
+            failure="",
+            problems=(*problems, *self._wrong, *rivals),
+            passed=tuple(passed),
+            starts=starts,
+        )
+
+    def _ask_master(self) -> None:
+        """Read the parameters back, and now and then who commands and where holding is told."""
+        cfg, node = self._cfg, self._node
+        found = node.param(f"/{cfg.controller}")
+        self._wrong = parameter_problems(found, cfg, self._joints, self._efforts)
+        if self._polls % GRAPH_POLLS == 0:
+            self._commanders = node.publishers_of(f"/{cfg.controller}/command_pose")
+            node.locate(f"{MANAGER}/switch_controller")  # to hold without a master
+        self._polls += 1
 
     def _acts(self, name: str) -> bool:
         if name not in self._acting:
@@ -160,10 +175,11 @@ class Poller:
         while (found := self._topic.take()) is not None:
             self._diagnostics.take(found.message.status, found.at)
 
-    def _say(self, problems: tuple[str, ...]) -> None:
-        if problems != self._said:
-            self._said = problems
-            log.warning("pr2_problems_changed", problems=list(problems))
+    def _say(self, seen: Seen) -> None:
+        words = (seen.failure, *seen.problems)
+        if words != self._said:
+            self._said = words
+            log.warning("pr2_problems_changed", failure=seen.failure, problems=list(seen.problems))
 
 
 class Holder:
@@ -217,8 +233,9 @@ class Holder:
                 self._hold()
             except RosError as error:
                 self.failures += 1
+                if not self.problem:
+                    log.error("pr2_hold_failed", error=str(error))
                 self.problem = f"{self._controller} could not be told to hold: {error}"
-                log.error("pr2_hold_failed", error=str(error))
                 self._stop.wait(RETRY_SECONDS)
                 self._asked.set()
                 continue
