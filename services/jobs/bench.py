@@ -19,6 +19,7 @@ from typing import Any, Literal, Protocol, cast
 
 import msgspec
 
+from services.jobs.machine import processor
 from shared.config.site import nearest
 from shared.errors import ConfigError
 from shared.runtime.build import SOURCE_ROOT, commit
@@ -227,23 +228,13 @@ def describe_machine(load_before: tuple[float, float, float]) -> Machine:
         except metadata.PackageNotFoundError:
             continue
     return Machine(
-        name=_processor(),
+        name=processor(),
         cores=len(os.sched_getaffinity(0)),
         python=platform.python_version(),
         versions=versions,
         load_before=load_before,
         load_after=os.getloadavg(),
     )
-
-
-def _processor() -> str:
-    """Return the processor's name as the kernel tells it."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return platform.machine()
-    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    return next(named, platform.machine())
 
 
 def text_of(report: dict[str, Any]) -> str:

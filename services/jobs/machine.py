@@ -3,6 +3,7 @@
 import contextlib
 import math
 import os
+import platform
 import resource
 import secrets
 import shutil
@@ -31,6 +32,16 @@ GOOD_CORES = 2
 PORTS = {7447: "the bus of a site (riposte router)", 9090: "the live view (riposte train --view)"}
 ROUND_TRIPS = 50
 SLOW_ROUND_TRIP_MS = 20.0
+
+
+def processor() -> str:
+    """Return the processor's name as the kernel tells it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.machine()
+    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(named, platform.machine())
 
 
 def check_cores() -> Finding:

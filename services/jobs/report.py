@@ -5,6 +5,7 @@ Works on a finished run, a stopped one, and one that goes on.
 
 import argparse
 import datetime
+import os
 import platform
 import shlex
 import sys
@@ -15,6 +16,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from services.jobs.machine import processor
 from services.jobs.pictures import Picture, bout_pictures
 from services.jobs.report_page import Extras, report_page
 from services.jobs.reproduction import HTML, JSON
@@ -172,7 +174,7 @@ def _origin(folder: Path, state: RunState, command: str) -> Origin:
         commit=commit(),
         packages={name: version for name in PACKAGES if (version := _version(name))},
         python=platform.python_version(),
-        machine=f"{platform.machine()}, {_processor()}",
+        machine=f"{platform.machine()}, {processor()}, {len(os.sched_getaffinity(0))} cores",
     )
 
 
@@ -181,19 +183,6 @@ def _version(name: str) -> str:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return ""
-
-
-def _processor() -> str:
-    """Return the processor's name and how many cores it has."""
-    import os
-
-    cores = f"{len(os.sched_getaffinity(0))} cores"
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return cores
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return f"{names[0]}, {cores}" if names else cores
 
 
 def _pictures(folder: Path, state: RunState, settings: Settings) -> list[Picture]:

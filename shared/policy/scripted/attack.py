@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from shared.game.geometry import dot
 from shared.policy.scripted.blades import turned, unit
-from shared.policy.scripted.memory import Arrays, Bools, Memory
-from shared.policy.scripted.sight import OWN, Arena, Sight, is_in_target, is_touching
+from shared.policy.scripted.memory import Bools, Remembering
+from shared.policy.scripted.sight import OWN, Sight, is_in_target, is_touching
 from shared.policy.scripted.tracking import track
 
 Floats = NDArray[np.float64]
@@ -42,14 +42,10 @@ SLASH_LONGEST = 1.2
 """Seconds after which a stroke ends wherever it is."""
 
 
-class Stab:
+class Stab(Remembering):
     """Thrusts into the target, stays while nothing touches, draws back and thrusts again."""
 
     offset_scale = 1.0
-
-    def __init__(self, arena: Arena) -> None:
-        self._arena = arena
-        self._memory = Memory()
 
     def act(self, obs: Float32s, generator: np.random.Generator) -> Float32s:
         """Return float32[N, 6]."""
@@ -88,23 +84,11 @@ class Stab:
         memory["thrusting"][where] = True
         memory["until"][where] = now[where] + GIVE_UP
 
-    def state(self) -> Arrays:
-        """Return what ``restore`` continues from."""
-        return self._memory.state()
 
-    def restore(self, arrays: Arrays) -> None:
-        """Continue from what ``state`` returned."""
-        self._memory.restore(arrays)
-
-
-class Slash:
+class Slash(Remembering):
     """Swings the blade to and fro through the target, each stroke in a plane of its own."""
 
     offset_scale = 1.0
-
-    def __init__(self, arena: Arena) -> None:
-        self._arena = arena
-        self._memory = Memory()
 
     def act(self, obs: Float32s, generator: np.random.Generator) -> Float32s:
         """Return float32[N, 6]."""
@@ -138,11 +122,3 @@ class Slash:
         middle = np.broadcast_to(SLASH_MIDDLE[:, None], (3, count))
         memory["end"][:, where] = turned(middle, SLASH_ANGLE * side * axes)
         memory["until"][where] = now[where] + SLASH_LONGEST
-
-    def state(self) -> Arrays:
-        """Return what ``restore`` continues from."""
-        return self._memory.state()
-
-    def restore(self, arrays: Arrays) -> None:
-        """Continue from what ``state`` returned."""
-        self._memory.restore(arrays)

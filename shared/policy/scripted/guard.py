@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from shared.game.geometry import BatShape, dot, length
 from shared.policy.scripted.blades import across, tangent_back
-from shared.policy.scripted.memory import Arrays, Memory
+from shared.policy.scripted.memory import Remembering
 from shared.policy.scripted.retreat import Retreat
 from shared.policy.scripted.sight import OTHER, OWN, Arena, Sight, nearest_to_centre
 from shared.policy.scripted.tracking import track
@@ -53,14 +53,13 @@ def meeting_point(grips: Floats, blades: Floats, bat: BatShape, radius: float) -
     return np.where(distance < radius, nearest - back * blades, outside)
 
 
-class Guard:
+class Guard(Remembering):
     """Bars the way from outside the target."""
 
     offset_scale = 1.0
 
     def __init__(self, arena: Arena) -> None:
-        self._arena = arena
-        self._memory = Memory()
+        super().__init__(arena)
         self._retreat = Retreat(self._memory, arena, PATIENCE_STEPS)
 
     def desired(self, sight: Sight) -> tuple[Floats, Floats]:
@@ -80,11 +79,3 @@ class Guard:
         is_new = self._memory.begin(sight.seconds)
         wanted = self._retreat.apply(is_new, sight, *self.desired(sight))
         return track(sight, *wanted, self._arena)
-
-    def state(self) -> Arrays:
-        """Return what ``restore`` continues from."""
-        return self._memory.state()
-
-    def restore(self, arrays: Arrays) -> None:
-        """Continue from what ``state`` returned."""
-        self._memory.restore(arrays)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from shared.game.geometry import dot
 from shared.policy.scripted.blades import across, turned
-from shared.policy.scripted.memory import Arrays, Memory
+from shared.policy.scripted.memory import Remembering
 from shared.policy.scripted.retreat import Retreat
 from shared.policy.scripted.sight import OTHER, OWN, Arena, Sight
 from shared.policy.scripted.tracking import track
@@ -45,7 +45,7 @@ def closest_share(low: Floats, up: Floats, bat_length: float, projection: Projec
     return np.clip(-dot(low, up - low) / divisor, 0.0, 1.0)
 
 
-class Heuristic:
+class Heuristic(Remembering):
     """The baseline protagonist of the paper's second study."""
 
     offset_scale = 1.0
@@ -64,9 +64,8 @@ class Heuristic:
             patience_steps: steps in the target after which the bat is drawn back; None as in the
                 paper: never.
         """
-        self._arena = arena
+        super().__init__(arena)
         self._projection: Projection = projection
-        self._memory = Memory()
         self._retreat = (
             None if patience_steps is None else Retreat(self._memory, arena, patience_steps)
         )
@@ -98,11 +97,3 @@ class Heuristic:
         if self._retreat is not None:
             grips, blades = self._retreat.apply(began, sight, grips, blades)
         return track(sight, grips, blades, self._arena)
-
-    def state(self) -> Arrays:
-        """Return what ``restore`` continues from."""
-        return self._memory.state()
-
-    def restore(self, arrays: Arrays) -> None:
-        """Continue from what ``state`` returned."""
-        self._memory.restore(arrays)

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shared.policy.scripted.sight import Arena
+
 Bools = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 Arrays = dict[str, NDArray[Any]]
@@ -55,3 +57,24 @@ class Memory:
     def restore(self, arrays: Arrays) -> None:
         """Continue from what ``state`` returned."""
         self._arrays = {name: value.copy() for name, value in arrays.items()}
+
+
+class Remembering:
+    """What scripted players that remember have in common: their memory can be kept."""
+
+    def __init__(self, arena: Arena) -> None:
+        """Begin with nothing in the memory.
+
+        Args:
+            arena: the sizes of the game.
+        """
+        self._arena = arena
+        self._memory = Memory()
+
+    def state(self) -> Arrays:
+        """Return what ``restore`` continues from."""
+        return self._memory.state()
+
+    def restore(self, arrays: Arrays) -> None:
+        """Continue from what ``state`` returned."""
+        self._memory.restore(arrays)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from shared.game.geometry import distance_between_bats
 from shared.policy.scripted.blades import unit
-from shared.policy.scripted.memory import Arrays, Bools, Memory
+from shared.policy.scripted.memory import Bools, Remembering
 from shared.policy.scripted.reaching import Reaching, noisy
 from shared.policy.scripted.senses import PENALTY, SCORING, Senses, Tones
 from shared.policy.scripted.sight import OWN, Arena, Sight
@@ -105,7 +105,7 @@ RECENCY = 0.3
 """Share by which a bout's score replaces what a tactic was worth (ibid., section 2.5)."""
 
 
-class Person:
+class Person(Remembering):
     """A person with a bat."""
 
     offset_scale = 4.0
@@ -113,9 +113,8 @@ class Person:
     bound, not faster than the arm's joints."""
 
     def __init__(self, arena: Arena, character: Character) -> None:
-        self._arena = arena.with_bounds_scaled(self.offset_scale)
+        super().__init__(arena.with_bounds_scaled(self.offset_scale))
         self._character = character
-        self._memory = Memory()
         self._reaching = Reaching(self._memory, character.peak_speed)
         self._senses = Senses(
             self._memory,
@@ -269,11 +268,3 @@ class Person:
 
     def _pauses(self, where: Bools, generator: np.random.Generator) -> Floats:
         return generator.uniform(*self._character.pause, int(np.count_nonzero(where)))
-
-    def state(self) -> Arrays:
-        """Return what ``restore`` continues from."""
-        return self._memory.state()
-
-    def restore(self, arrays: Arrays) -> None:
-        """Continue from what ``state`` returned."""
-        self._memory.restore(arrays)
