@@ -75,5 +75,5 @@ def open_extras(args: ServeArgs, bus: Bus, clock: Clock) -> Extras:
         ConfigError: a value is out of its range, or a recording cannot be read.
     """
     heart_rate = open_heart_rate(args.section("heart_rate", HeartRateConfig), bus, clock)
-    tones = open_tones(args.section("tones", TonesConfig), bus, clock)
+    tones = open_tones(args.section("tones", TonesConfig), bus)
     return Extras(tuple(extra for extra in (heart_rate, tones) if extra is not None))

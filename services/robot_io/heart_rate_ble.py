@@ -8,6 +8,7 @@ Nothing but the last 64 measurements is kept for a loop that does not look.
 
 import asyncio
 import contextlib
+import contextvars
 import threading
 from collections import deque
 
@@ -61,7 +62,12 @@ class BleStrap:
         self._stop: asyncio.Event | None = None
         self._is_closed = False
         self._heard_at = 0.0
-        self._thread = threading.Thread(target=self._work, name="heart-rate", daemon=True)
+        self._thread = threading.Thread(
+            target=contextvars.copy_context().run,  # log lines say whose they are
+            args=(self._work,),
+            name="heart-rate",
+            daemon=True,
+        )
         self._thread.start()
 
     def take(self, now: float) -> Beat | None:

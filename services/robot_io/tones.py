@@ -6,10 +6,11 @@ from typing import Literal, Protocol
 import msgspec
 
 from shared.bus.base import Bus
-from shared.clock import Clock
 from shared.messages.topics import REFEREE
 
 LEAST_HZ, MOST_HZ = 20.0, 8000.0
+CONFIRM_SECONDS = 0.1
+"""A tone that goes on is said again so often, for a sink forgets what is not kept up."""
 TAKE_MOST = 4
 """States of the referee taken in one tick."""
 
@@ -23,6 +24,8 @@ class TonesConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Part of the sound device's name; empty for the system's default."""
     volume: float = 0.3
     """Of the tone at full loudness, 0 to 1."""
+    latency: float = 0.02
+    """Sound made ahead; doubled, up to 0.16, while the machine is too busy to keep up (s)."""
     silence_after: float = 0.25
     """Without the referee for so long a tone ends (s)."""
     retry: float = 5.0
@@ -35,7 +38,8 @@ class TonesConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
             ValueError: a value is out of its range; says which, and what is allowed.
         """
         for name, low, high in (
-            ("volume", 0.0, 1.0), ("silence_after", 0.05, 5.0), ("retry", 0.1, 600.0),
+            ("volume", 0.0, 1.0), ("latency", 0.005, 0.16), ("silence_after", 0.05, 5.0),
+            ("retry", 0.1, 600.0),
         ):  # fmt: skip
             value = getattr(self, name)
             if not low <= value <= high:  # also refuses NaN
@@ -51,7 +55,7 @@ class ToneSink(Protocol):
     """Something that sounds; nothing here may block."""
 
     def play(self, hz: float) -> None:
-        """Sound a tone from now on; 0 for silence."""
+        """Sound a tone, 0 for silence; said again while it shall go on."""
         ...
 
     def rates(self) -> dict[str, float]:
@@ -88,6 +92,7 @@ class Tones:
         self._said = bus.subscribe(REFEREE)
         self._hz = 0.0
         self._heard_at = -math.inf
+        self._told_at = -math.inf
         self._counters = {"tone_switches": 0, "tones_cut": 0, "tones_refused": 0}
 
     def tick(self, now: float) -> None:
@@ -96,10 +101,12 @@ class Tones:
             if (state := self._said.take()) is None:
                 break
             self._heard_at = now
-            self._play(self._usable(state.tone_hz))
+            self._turn_to(self._usable(state.tone_hz), now)
         if self._hz and now - self._heard_at > self._silence_after:
             self._counters["tones_cut"] += 1
-            self._play(0.0)
+            self._turn_to(0.0, now)
+        elif self._hz and now - self._told_at > CONFIRM_SECONDS:
+            self._tell(now)
 
     def _usable(self, hz: float) -> float:
         if hz == 0.0 or LEAST_HZ <= hz <= MOST_HZ:
@@ -107,12 +114,16 @@ class Tones:
         self._counters["tones_refused"] += 1  # NaN too
         return 0.0
 
-    def _play(self, hz: float) -> None:
+    def _turn_to(self, hz: float, now: float) -> None:
         if hz == self._hz:
             return
         self._hz = hz
         self._counters["tone_switches"] += 1
-        self._sink.play(hz)
+        self._tell(now)
+
+    def _tell(self, now: float) -> None:
+        self._told_at = now
+        self._sink.play(self._hz)
 
     def rates(self) -> dict[str, float]:
         """Return the tone that sounds (Hz), and what the sink measures."""
@@ -134,10 +145,10 @@ class Tones:
         self._said.close()
 
 
-def open_tones(cfg: TonesConfig, bus: Bus, clock: Clock) -> Tones | None:
+def open_tones(cfg: TonesConfig, bus: Bus) -> Tones | None:
     """Return what the settings ask for; None for no sound."""
     if cfg.sink == "null":
         return None
-    from services.robot_io.tones_sounddevice import SoundCard  # only where it is asked for
+    from services.robot_io.tones_sounddevice import SoundCard  # a process more
 
-    return Tones(SoundCard(cfg.device, cfg.volume, cfg.retry, clock), cfg.silence_after, bus)
+    return Tones(SoundCard(cfg), cfg.silence_after, bus)

@@ -1,154 +1,152 @@
-"""Tones on a sound card, through PortAudio; a thread opens it and watches over it.
+"""Tones on a sound card: a child process sounds them, and a thread watches over the child."""
 
-PortAudio calls for samples on a thread of its own; ``play`` only sets the number that the next
-block is made from. A card that is missing, or goes away, is looked for again every few seconds.
-"""
-
+import contextlib
+import contextvars
+import os
+import subprocess
+import sys
 import threading
-import time
-from typing import TYPE_CHECKING
+from typing import IO
 
+import msgspec
 import structlog
 
-from services.robot_io.tones_synth import Samples, ToneSynth
-from shared.clock import Clock
+from services.robot_io.tones import TonesConfig
+from services.robot_io.tones_player import WORD, Report
+from shared.runtime.process import THREAD_LIMITS
 
-if TYPE_CHECKING:
-    import sounddevice
-
-WATCH_SECONDS = 0.25
-SILENT_SECONDS = 1.5
-"""A stream that has not asked for samples for so long is dead."""
-FADE_SECONDS = 0.03
-CLOSE_SECONDS = 3.0
-"""Longest wait for the card to be let go; a thread that hangs in it is left behind."""
+CLOSE_SECONDS = 2.0
+"""Longest wait for the child to fall silent and end; then it is killed."""
+MAX_LINE = 4096
 
 log = structlog.get_logger()
 
 
 class SoundCard:
-    """A tone that sounds until it is changed."""
+    """A tone that sounds until it is changed, or for half a second after the last word."""
 
-    def __init__(self, device: str, volume: float, retry: float, clock: Clock) -> None:
-        """Start the thread.
+    def __init__(self, cfg: TonesConfig) -> None:
+        """Start the thread, and with it the child.
 
         Args:
-            device: part of the device's name; empty for the default.
-            volume: of the tone at full loudness, 0 to 1.
-            retry: wait before a missing card is looked for again (s).
-            clock: a clock that moves by itself and may be read from any thread.
+            cfg: which card, and how loud.
         """
-        self._device = device
-        self._volume = volume
-        self._retry = retry
-        self._clock = clock
-        self._hz = 0.0
-        self._asked_at = 0.0
-        self._latency = 0.0
-        self._counts = {"tone_underruns": 0, "tone_streams": 0}
-        self._problem = "opening the sound card"
+        self._cfg = cfg
+        self._report = Report(problem="opening the sound card")
+        self._restarts = 0
+        self._lock = threading.Lock()
+        """Held while the pipe is written to or taken away."""
+        self._pipe: IO[bytes] | None = None
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._work, name="tones", daemon=True)
+        self._child: subprocess.Popen[bytes] | None = None
+        run = contextvars.copy_context().run  # log lines say whose they are
+        self._thread = threading.Thread(target=run, args=(self._work,), name="tones", daemon=True)
         self._thread.start()
 
     def play(self, hz: float) -> None:
-        """Sound a tone from the next block on; 0 for silence."""
-        self._hz = hz
+        """Sound a tone; to be said again while it shall go on."""
+        # A pipe that is full or broken is the thread's business.
+        with self._lock, contextlib.suppress(OSError):
+            if self._pipe is not None:
+                os.write(self._pipe.fileno(), WORD.pack(hz))
 
     def rates(self) -> dict[str, float]:
         """Return the latency that the card reports (ms)."""
-        return {"tone_latency_ms": 1e3 * self._latency} if self._latency else {}
+        latency = self._report.latency_ms
+        return {"tone_latency_ms": latency} if latency else {}
 
     def counters(self) -> dict[str, int]:
-        """Return streams opened, and blocks that came too late."""
-        return dict(self._counts)
+        """Return streams opened, blocks that came too late, and children that died."""
+        return {
+            "tone_streams": self._report.streams,
+            "tone_underruns": self._report.underruns,
+            "tone_restarts": self._restarts,
+        }
 
     @property
     def problem(self) -> str:
         """Return why nothing sounds; empty when it would."""
-        return self._problem
+        return self._report.problem
 
     def close(self) -> None:
         """Fall silent and let go of the card, in ``CLOSE_SECONDS`` at most."""
-        self._hz = 0.0
         self._stop.set()
+        self._hang_up()
         self._thread.join(CLOSE_SECONDS)
-        if self._thread.is_alive():
-            log.warning("tones_left_behind", reason=f"not closed in {CLOSE_SECONDS:g} s")
+        if self._thread.is_alive() and self._child is not None:
+            self._child.kill()
+            self._thread.join(CLOSE_SECONDS)
 
     def _work(self) -> None:
-        try:
-            import sounddevice
-        except (ImportError, OSError) as error:  # OSError: no libportaudio
-            self._fail(f"{error}; `pip install riposte[play]`, `apt install libportaudio2`")
-            return
+        words = [sys.executable, "-m", "services.robot_io.tones_player"]
+        words.append(msgspec.json.encode(self._cfg).decode())
         while not self._stop.is_set():
-            try:
-                self._sound()
-            except (sounddevice.PortAudioError, ValueError, OSError) as error:
-                text = str(error).split(" [PaErrorCode")[0].rstrip(".")
-                self._fail(f"{text}; plug a sound card in, or set tones.sink = 'null'")
-            except Exception:  # the edge of the thread: the loop that moves the robot goes on
-                log.exception("tones_crashed")
-                self._problem = "a bug, see the log; the rest goes on without sound"
+            # Native libraries write what they like to stderr; what matters comes in a report.
+            with subprocess.Popen(
+                words,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env=os.environ | THREAD_LIMITS,
+            ) as child:
+                self._child = child
+                self._listen_to(child)
+            if self._stop.is_set():
                 return
-            if not self._stop.wait(self._retry):
-                # What PortAudio knows of devices is as old as its start.
-                sounddevice._terminate()  # pyright: ignore[reportPrivateUsage]
-                sounddevice._initialize()  # pyright: ignore[reportPrivateUsage]
+            self._restarts += 1
+            self._take(self._report_of_end(child.returncode))
+            self._stop.wait(self._cfg.retry)
 
-    def _sound(self) -> None:
-        """Sound until closed.
+    def _report_of_end(self, code: int) -> Report:
+        """Return what to say of a child that ended by itself."""
+        problem = self._report.problem
+        if code <= 0 or not problem:
+            problem = (
+                f"the sound process ended with {f'signal {-code}' if code < 0 else code}; look at "
+                "the sound set-up (`aplay -L`), or set tones.sink = 'null'"
+            )
+        return msgspec.structs.replace(self._report, problem=problem, latency_ms=0.0)
 
-        Raises:
-            PortAudioError: the card cannot be opened.
-            OSError: it went away.
-            ValueError: no device has that name, or several have.
-        """
-        import sounddevice
-
-        device = self._device or None
-        channels = min(int(sounddevice.query_devices(device, "output")["max_output_channels"]), 2)
-        synth: ToneSynth | None = None
-
-        def fill(
-            out: Samples, frames: int, _time: object, status: sounddevice.CallbackFlags
-        ) -> None:
-            assert synth is not None  # the stream starts after it is made
-            self._asked_at = self._clock.now()
-            self._counts["tone_underruns"] += bool(status.output_underflow)
-            out[:] = synth.render(frames, self._hz)[:, None]
-
-        stream = sounddevice.OutputStream(
-            device=device, channels=channels, dtype="float32", latency="low", callback=fill
-        )
+    def _listen_to(self, child: "subprocess.Popen[bytes]") -> None:
+        """Take the child's reports until it has ended."""
+        assert child.stdin is not None
+        assert child.stdout is not None
+        os.set_blocking(child.stdin.fileno(), False)
+        with self._lock:
+            self._pipe = child.stdin
+        if self._stop.is_set():
+            self._hang_up()
+        before = self._report
+        for line in iter(lambda: child.stdout.readline(MAX_LINE), b""):  # type: ignore[union-attr]
+            with contextlib.suppress(msgspec.MsgspecError):
+                report = msgspec.json.decode(line, type=Report)
+                self._take(
+                    msgspec.structs.replace(
+                        report,
+                        streams=before.streams + report.streams,
+                        underruns=before.underruns + report.underruns,
+                    )
+                )
+        self._hang_up()
         try:
-            synth = ToneSynth(stream.samplerate, self._volume)
-            self._asked_at = self._clock.now()
-            stream.start()
-            self._latency = stream.latency
-            self._counts["tone_streams"] += 1
-            self._problem = ""
-            log.info("tones_opened", rate_hz=stream.samplerate, latency_ms=1e3 * stream.latency)
-            self._watch(stream)
-        finally:
-            self._latency = 0.0
-            stream.abort()
-            stream.close()
+            child.wait(CLOSE_SECONDS)
+        except subprocess.TimeoutExpired:
+            child.kill()
 
-    def _watch(self, stream: "sounddevice.OutputStream") -> None:
-        """Return once closed and faded out.
+    def _hang_up(self) -> None:
+        with self._lock:
+            pipe, self._pipe = self._pipe, None
+            if pipe is not None:
+                pipe.close()
 
-        Raises:
-            OSError: the card stopped asking for samples.
-        """
-        while not self._stop.wait(WATCH_SECONDS):
-            if not stream.active or self._clock.now() - self._asked_at > SILENT_SECONDS:
-                raise OSError("the sound card went away")
-        time.sleep(FADE_SECONDS)
-
-    def _fail(self, reason: str) -> None:
-        """Log a reason once, and keep it for ``riposte status``."""
-        if reason != self._problem:
-            log.warning("tones_unavailable", reason=reason)
-        self._problem = reason
+    def _take(self, report: Report) -> None:
+        """Keep a report for ``riposte status``, and log what people should know, once."""
+        before, self._report = self._report, report
+        if report.problem and report.problem != before.problem:
+            log.warning("tones_unavailable", reason=report.problem)
+        elif report.streams != before.streams:
+            log.info(
+                "tones_opened",
+                latency_ms=round(report.latency_ms, 1),
+                underruns=report.underruns,
+            )

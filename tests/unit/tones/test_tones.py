@@ -70,18 +70,33 @@ def test_the_sink_hears_each_change_once():
     }  # fmt: skip
 
 
+def test_a_tone_that_goes_on_is_said_again_and_silence_is_not():
+    it = Sounding()
+    for _ in range(20):
+        it.say(440.0)
+        it.pass_time(0.02)
+    assert it.sink.played == [440.0] * 4
+    for _ in range(20):
+        it.say(0.0)
+        it.pass_time(0.02)
+    assert it.sink.played == [440.0] * 4 + [0.0]
+    assert it.tones.counters()["tone_switches"] == 2
+
+
 def test_a_tone_ends_when_the_referee_falls_silent():
     it = Sounding()
     it.say(440.0)
     assert it.tones.rates() == {"tone_hz": 440.0, "tone_latency_ms": 12.0}
-    it.pass_time(0.24)
+    it.pass_time(0.05)
     assert it.sink.played == [440.0]
+    it.pass_time(0.19)
+    assert it.sink.played == [440.0, 440.0]
     it.pass_time(0.02)
     it.pass_time(1.0)
-    assert it.sink.played == [440.0, 0.0]
+    assert it.sink.played == [440.0, 440.0, 0.0]
     assert it.tones.counters()["tones_cut"] == 1
     it.say(300.0)
-    assert it.sink.played == [440.0, 0.0, 300.0]
+    assert it.sink.played == [440.0, 440.0, 0.0, 300.0]
 
 
 @pytest.mark.parametrize("hz", [float("nan"), float("inf"), -440.0, 1.0, 90000.0])
@@ -103,7 +118,7 @@ def test_closing_falls_silent_first():
 
 def test_silence_is_the_default():
     clock = ManualClock()
-    assert open_tones(TonesConfig(), MemoryHub(clock).join("x"), clock) is None
+    assert open_tones(TonesConfig(), MemoryHub(clock).join("x")) is None
 
 
 @pytest.mark.parametrize(
@@ -111,6 +126,7 @@ def test_silence_is_the_default():
     [
         ({"volume": 1.1}, "volume is 1.1; allowed are 0 to 1"),
         ({"volume": float("nan")}, "volume is nan; allowed are 0 to 1"),
+        ({"latency": 0.001}, "latency is 0.001; allowed are 0.005 to 0.16"),
         ({"silence_after": 0.0}, "silence_after is 0; allowed are 0.05 to 5"),
         ({"retry": 0.0}, "retry is 0; allowed are 0.1 to 600"),
         ({"device": "USB"}, "device is 'USB' and sink is 'null'"),
