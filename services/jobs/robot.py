@@ -1,4 +1,4 @@
-"""`riposte robot`: what a person does to the robot: check, arm, disarm, reset."""
+"""`riposte robot`: what a person does to the robot: check, arm, disarm, reset, calibrate."""
 
 import argparse
 import contextlib
@@ -26,6 +26,7 @@ ABOUT = {
     "arm": "let the robot move; somebody must hold its run stop",
     "disarm": "shut the gate: the robot stays where it is",
     "reset": "after a trip: back to disarmed, once the robot is in order",
+    "calibrate": "where a Vive's base stations stand: riposte robot calibrate --help",
 }
 PLAYED = Path("runs/latest-play")
 """The newest match of `riposte play`."""
@@ -37,9 +38,14 @@ EXIT_REFUSED = 1
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Do what a person asks; return 1 when robot_io will not."""
-    found = _parse(sys.argv[1:] if argv is None else argv)
+    words = list(sys.argv[1:] if argv is None else argv)
+    if words[:1] == ["calibrate"]:
+        from services.jobs import calibrate  # scipy, of the extra `robot`
+
+        return calibrate.main(words[1:])
+    found = _parse(words)
     clock = SystemClock()
-    with contextlib.closing(open_site_bus(_place(found), clock)) as bus:
+    with contextlib.closing(open_site_bus(place(found), clock)) as bus:
         reply = ask(bus, clock, found.action)
     if found.json:
         print(json.dumps(msgspec.to_builtins(reply)))
@@ -52,7 +58,7 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="riposte robot",
         description="What a person does to the robot of a match or a site.",
-        epilog="\n".join(f"{name:<8} {about}" for name, about in ABOUT.items()),
+        epilog="\n".join(f"{name:<9} {about}" for name, about in ABOUT.items()),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("action", choices=get_args(Action), metavar="|".join(get_args(Action)))
@@ -69,7 +75,7 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
     return parser.parse_args(argv)
 
 
-def _place(found: argparse.Namespace) -> ServeArgs:
+def place(found: argparse.Namespace) -> ServeArgs:
     """Return where robot_io is: in the match that goes on, else where the site file says.
 
     Raises:
