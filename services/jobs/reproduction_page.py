@@ -243,15 +243,21 @@ def _held(tournament: Tournament) -> Node:
             span_text(one.score),
             *_taken(one.below_static),
             *_taken(one.below_heuristic),
+            *_taken(one.below_retreating),
+            points_text(one.camping_points, sign=False),
         )
         for one in tournament.held
     ]
-    headers = ("protagonist", "score", "95 %", "below static", "95 %", "below heuristic", "95 %")
+    headers = (
+        "protagonist", "score", "95 %", "below static", "95 %", "below heuristic", "95 %",
+        "below retreating", "95 %", "camping",
+    )  # fmt: skip
     caption = (
         f"Mean score a bout of {', '.join(tournament.scripted)}, each counted alike; the lower, "
-        "the better for the protagonist. Baselines first."
+        "the better for the protagonist. Baselines first. Camping: points a bout paid for the "
+        "protagonist's own."
     )
-    return html.table(headers, rows, numbers=range(1, 7), caption=caption)
+    return html.table(headers, rows, numbers=range(1, 10), caption=caption)
 
 
 def _taken(score: Score | None) -> tuple[Node, Node]:

@@ -83,6 +83,10 @@ class Held(Frozen, frozen=True, kw_only=True):
     below_static: Score | None
     """Static's score minus this: points taken off by this protagonist."""
     below_heuristic: Score | None
+    below_retreating: Score | None = None
+    """Than the heuristic that leaves the target before it is paid for."""
+    camping_points: float = 0.0
+    """Of ``score``, points a bout that were paid for the protagonist's camping."""
 
 
 class Tournament(Frozen, frozen=True, kw_only=True):

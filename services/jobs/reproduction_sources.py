@@ -37,7 +37,8 @@ KEPT = 3
 """Components of the paper."""
 STATIC = "scripted:static"
 HEURISTIC = "scripted:heuristic"
-BASELINES = (STATIC, HEURISTIC)
+RETREATING = "scripted:heuristic-retreating"
+BASELINES = (STATIC, HEURISTIC, RETREATING)
 INSTALL = "pip install 'riposte[styles]'"
 
 
@@ -123,7 +124,8 @@ def _held(
         return float(payoff.mean[scripted, k].mean()), resampled
 
     mean, resampled = means(ref)
-    count = int(payoff.bouts[scripted, payoff.protagonists.index(ref)].sum())
+    own = payoff.protagonists.index(ref)
+    count = int(payoff.bouts[scripted, own].sum())
 
     def below(baseline: str) -> Score | None:
         if baseline not in played or ref in BASELINES:
@@ -134,6 +136,8 @@ def _held(
     return Held(
         protagonist=table.label(ref), score=_score(mean, resampled, count),
         below_static=below(STATIC), below_heuristic=below(HEURISTIC),
+        below_retreating=below(RETREATING),
+        camping_points=float(payoff.camping_points[scripted, own].mean()),
     )  # fmt: skip
 
 

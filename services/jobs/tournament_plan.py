@@ -11,11 +11,14 @@ from services.league.history import RunState
 from services.league.snapshots import SnapshotStore
 from shared.errors import ConfigError, SnapshotError
 from shared.messages.training import AGENTS, Agent
-from shared.policy.players import SCRIPTED_PLAYERS, SCRIPTED_PREFIX, scripted_player
+from shared.policy.players import (
+    SCRIPTED_PLAYERS,
+    SCRIPTED_PREFIX,
+    scripted_player,
+    scripted_role,
+)
 from shared.policy.snapshot import MAX_BYTES, Fit, unpack
 
-SCRIPTED_ANTAGONISTS = ("stab", "slash", "person-novice", "person-steady", "person-adaptive")
-"""Scripted players that attack; all others guard."""
 MOST_PLAYERS = 256
 """On one side."""
 
@@ -96,8 +99,7 @@ class Pools:
         if reference.startswith(SCRIPTED_PREFIX):
             scripted_player(reference)  # refuses an unknown one
             name = reference.removeprefix(SCRIPTED_PREFIX)
-            agent: Agent = "antagonist" if name in SCRIPTED_ANTAGONISTS else "protagonist"
-            self._enter(agent, reference, name)
+            self._enter(scripted_role(name), reference, name)
         elif reference.startswith("sha256:"):
             self._add_snapshot(reference)
         else:

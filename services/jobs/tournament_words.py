@@ -21,7 +21,7 @@ def standings_text(standings: Standings) -> str:
     ):
         head = (agent, "Elo", "95 %", "won", "Nash", "exploitable by", "95 %")
         rows = [_row(standings, rating, places.get(rating.player)) for rating in pool]
-        lines += [*_aligned([head, *rows]), ""]
+        lines += [*aligned([head, *rows]), ""]
     advantage = _interval(ratings.antagonist_advantage)
     lines.append(f"A mean antagonist is {advantage} Elo points stronger than a mean protagonist.")
     if nash is not None:
@@ -55,7 +55,7 @@ def _interval(estimate: Estimate) -> str:
     return f"{points_text(estimate.value)} (95 %: {low} to {high})"
 
 
-def _aligned(rows: Sequence[tuple[str, ...]]) -> list[str]:
+def aligned(rows: Sequence[tuple[str, ...]]) -> list[str]:
     """Return rows of a table, the first column flush left and the others flush right."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return [

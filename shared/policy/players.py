@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.errors import SnapshotError
-from shared.messages.training import ACTION_DIM
+from shared.messages.training import ACTION_DIM, Agent
 from shared.policy.mlp import GaussianPolicy
 from shared.policy.scripted.attack import Slash, Stab
 from shared.policy.scripted.guard import Guard
@@ -77,21 +77,31 @@ class StaticPlayer:
         return np.zeros((len(obs), ACTION_DIM), np.float32)
 
 
-SCRIPTED_PLAYERS: dict[str, Callable[[Arena], Player]] = {
+Makers = dict[str, Callable[[Arena], Player]]
+
+SCRIPTED_PROTAGONISTS: Makers = {
     "static": lambda arena: StaticPlayer(),
-    # Protagonists.
     "heuristic": Heuristic,
     "heuristic-printed": lambda arena: Heuristic(arena, projection="printed"),
     "heuristic-retreating": lambda arena: Heuristic(arena, patience_steps=RETREAT_STEPS),
     "guard": Guard,
-    # Antagonists.
+}
+"""Those that defend, by name."""
+SCRIPTED_ANTAGONISTS: Makers = {
     "stab": Stab,
     "slash": Slash,
     "person-novice": lambda arena: Person(arena, NOVICE),
     "person-steady": lambda arena: Person(arena, STEADY),
     "person-adaptive": lambda arena: Person(arena, ADAPTIVE),
 }
-"""By name; docs/players.md describes them."""
+"""Those that attack, by name."""
+SCRIPTED_PLAYERS: Makers = SCRIPTED_PROTAGONISTS | SCRIPTED_ANTAGONISTS
+"""All, by name; docs/players.md describes them."""
+
+
+def scripted_role(name: str) -> Agent:
+    """Return the side that a scripted player is for."""
+    return "antagonist" if name in SCRIPTED_ANTAGONISTS else "protagonist"
 
 
 def scripted_player(reference: str, arena: Arena | None = None) -> Player:

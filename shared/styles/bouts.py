@@ -145,7 +145,11 @@ def load(path: Path) -> BoutTable:
     if not path.is_file():
         raise RiposteError(f"there is no {path}; play the bouts with: riposte tournament RUN")
     try:
-        found = pq.read_table(io.BytesIO(path.read_bytes()), page_checksum_verification=True)
+        # In this thread: a pool that is still alive when the interpreter ends can abort it.
+        found = pq.read_table(
+            io.BytesIO(path.read_bytes()), page_checksum_verification=True, use_threads=False,
+            pre_buffer=False,
+        )  # fmt: skip
     except (OSError, pa.ArrowException, ValueError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise _damaged(path, reason) from None

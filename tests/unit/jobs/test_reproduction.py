@@ -146,10 +146,10 @@ def test_another_sampler_than_the_papers_does_not_match(tmp_path: Path) -> None:
     assert found.draws[0].replayed == found.draws[0].draws
 
 
-def test_each_protagonist_is_compared_with_both_baselines(found: Reproduction) -> None:
+def test_each_protagonist_is_compared_with_the_baselines(found: Reproduction) -> None:
     assert found.tournament is not None
     held = {one.protagonist: one for one in found.tournament.held}
-    assert list(held)[:2] == ["static", "heuristic"]
+    assert list(held)[:3] == ["static", "heuristic", "heuristic-retreating"]
     assert held["static"].below_static is None
     first, third = held["protagonist 1"], held["protagonist 3"]
     assert first.score.mean == pytest.approx(100, abs=30)
@@ -161,7 +161,21 @@ def test_each_protagonist_is_compared_with_both_baselines(found: Reproduction) -
     assert claim(found, "scripted and simulated antagonists held lower than by static").holds
     told = claim(found, "scripted and simulated antagonists held lower than by the heuristic")
     assert told.holds is True
-    assert told.found.startswith("2 of 3 for certain")
+    assert "2 of 3 for certain" in told.found
+
+
+def test_what_the_papers_heuristic_loses_by_camping_is_said_and_one_that_does_not_camp_shown(
+    found: Reproduction,
+) -> None:
+    assert found.tournament is not None
+    held = {one.protagonist: one for one in found.tournament.held}
+    assert held["heuristic"].camping_points == 100.0
+    assert held["heuristic-retreating"].camping_points == 0.0
+    told = claim(found, "scripted and simulated antagonists held lower than by the heuristic")
+    assert told.found.startswith("the paper's heuristic camps: under the paper's rule 100 of the 2")
+    told = claim(found, "scripted and simulated antagonists held lower than by a heuristic that")
+    assert told.holds is False
+    assert told.found.startswith("1 of 3 for certain: protagonist 1 by +")
 
 
 def test_camping_is_a_share_of_all_points_given_and_taken(found: Reproduction) -> None:

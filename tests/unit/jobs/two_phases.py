@@ -29,7 +29,11 @@ BOUTS = 20
 """Of each pairing of the tournament."""
 POINTS_PER_REWARD = 10.0
 PEOPLE = ("scripted:stab", "scripted:person-steady")
-MEANS = {"scripted:static": 1500.0, "scripted:heuristic": 300.0}
+MEANS = {
+    "scripted:static": 1500.0,
+    "scripted:heuristic": 300.0,
+    "scripted:heuristic-retreating": 150.0,
+}
 """What everybody scores against these; against the warm start 400, against round k 100 k."""
 
 
@@ -133,7 +137,8 @@ def bout_table(state: RunState) -> BoutTable:
     count = len(antagonist)
     mean = np.array([means[ref] for ref in protagonists])[protagonist]
     score = np.round(generator.normal(mean, 50.0)).astype(np.float32)
-    camping = np.where(protagonist == 0, 2, 0).astype(np.int32)
+    is_heuristic = protagonist == protagonists.index("scripted:heuristic")
+    camping = np.select([protagonist == 0, is_heuristic], [2, 10], 0).astype(np.int32)
     features = generator.normal(0.0, 0.1, (count, 2, 8)).astype(np.float32)
     features[:, 1] += 5.0 + np.eye(8, dtype=np.float32)[protagonist % 8] * 4.0
     return BoutTable(
