@@ -77,7 +77,7 @@ class Pr2Link:
         self._holder = Holder(node, name)
         self._reader = JointReader(joints)
         self._offset = ClockOffset()
-        self._restarts = Restarts()
+        self._restarts = Restarts(cfg.pose_command_filter)
         self._cart: CartState | None = None
         self._arm: JointsState | None = None
         self._board: Board | None = None
@@ -175,7 +175,7 @@ class Pr2Link:
                 self._refuse("state", error)
                 continue
             self._cart, self._refused["state"] = cart, ""
-            self._restarts.observe(cart.stamp, cart.target)
+            self._restarts.observe(cart.stamp, cart.target, cart.filtered)
             self._offset.offer(found.at, 1e-9 * found.wall_ns - cart.stamp)
         if (found := self._joints.take()) is not None:
             try:

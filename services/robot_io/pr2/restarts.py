@@ -1,8 +1,13 @@
 """Whether the controller was restarted, or is commanded by another: its generation.
 
-A restarted controller takes where the arm is for its target. So a target that changes to what was
-never sent tells of a restart, or of another node that commands; either way what the gate knew of
-it is void. A stream that was silent, or went back in time, tells the same.
+A restarted controller takes where the arm is for its target, and its filter begins there. So a
+target that was never sent tells of a restart, or of another node that commands, and so does a
+filtered target that leaps; what the gate knew of the controller is void then. A stream that was
+silent, or went back in time, tells the same.
+
+The controller's command thread writes the target while its realtime thread reads it, unlocked
+(JTCartesianController, ``commandPose``), so that one state in many thousands has a target that is
+half of one command and half of the next. Hence one strange target counts for nothing.
 """
 
 import math
@@ -16,43 +21,90 @@ SILENT_SECONDS: Final = 0.2
 SAME_M: Final = 1e-6
 """A target this near to one that was sent is that one."""
 REMEMBERED: Final = 256
+STRANGE_IN_A_ROW: Final = 2
+STRANGE_A_SECOND: Final = 3
+LEAP_M: Final = 0.003
+"""The filtered target may move by so much more than its filter lets it."""
+LEAP_MARGIN: Final = 1.5
 
 
 class Restarts:
     """Counts the controller's generations."""
 
-    def __init__(self) -> None:
+    def __init__(self, share: float) -> None:
+        """Know of nothing yet.
+
+        Args:
+            share: of the way to its target that the filtered one goes in a millisecond.
+        """
         self.generation = 0
         self.reason = ""
         """Of the last change."""
+        self._share = share
         self._sent: deque[Vector] = deque(maxlen=REMEMBERED)
         self._stamp = -math.inf
         self._target: Vector | None = None
+        """The last that was taken for good."""
+        self._last: Vector | None = None
+        """As the last state had it."""
+        self._filtered: Vector | None = None
+        self._strange: deque[float] = deque(maxlen=STRANGE_A_SECOND)
+        """Stamps of targets that were not sent."""
+        self._row = 0
 
     def sent(self, position: Vector) -> None:
         """Take it that this was commanded (m)."""
         self._sent.append(position)
 
-    def observe(self, stamp: float, target: Vector) -> None:
+    def observe(self, stamp: float, target: Vector, filtered: Vector) -> None:
         """Take one state of the controller.
 
         Args:
             stamp: by the robot's clock (s).
             target: ``x_desi`` (m); may be NaN.
+            filtered: ``x_desi_filtered`` (m); may be NaN.
         """
         before, self._stamp = self._stamp, stamp
+        passed = stamp - before
         if math.isfinite(before):
-            if stamp < before:
-                self.bump(f"the robot's time went back by {before - stamp:.3f} s")
-            elif stamp - before > SILENT_SECONDS:
-                self.bump(f"the controller was silent for {stamp - before:.2f} s")
-        old, self._target = self._target, target
-        if old is None or not distance(old, target) > SAME_M:
-            return
-        if not any(distance(one, target) <= SAME_M for one in reversed(self._sent)):
-            self.bump("its target changed to what was not sent")
+            if passed < 0.0:
+                self.bump(f"the robot's time went back by {-passed:.3f} s")
+            elif passed > SILENT_SECONDS:
+                self.bump(f"the controller was silent for {passed:.2f} s")
+            elif self._leaps(passed, target, filtered):
+                self.bump("its filtered target leapt")
+        self._last, self._filtered = target, filtered
+        self._judge(stamp, target)
 
     def bump(self, reason: str) -> None:
         """Begin a new generation."""
         self.generation += 1
         self.reason = reason
+
+    def _judge(self, stamp: float, target: Vector) -> None:
+        """Count targets that were not sent."""
+        if self._target is None or self._is_known(target):
+            self._target, self._row = target, 0
+            return
+        self._row += 1
+        self._strange.append(stamp)
+        many = len(self._strange) == STRANGE_A_SECOND and stamp - self._strange[0] <= 1.0
+        if self._row >= STRANGE_IN_A_ROW or many:
+            self.bump("its target changed to what was not sent")
+            self._target, self._row = target, 0
+            self._strange.clear()
+
+    def _is_known(self, target: Vector) -> bool:
+        """Return whether the target is the one before, or was sent, or is not a number."""
+        if self._target is None or not distance(self._target, target) > SAME_M:
+            return True
+        return any(distance(one, target) <= SAME_M for one in reversed(self._sent))
+
+    def _leaps(self, passed: float, target: Vector, filtered: Vector) -> bool:
+        """Return whether the filtered target went further than its filter lets it."""
+        old, last = self._filtered, self._last
+        if old is None or last is None:
+            return False
+        way = 1.0 - (1.0 - self._share) ** (1000.0 * passed + 1.0)
+        reach = max(distance(old, last), distance(old, target))
+        return distance(old, filtered) > LEAP_MARGIN * way * reach + LEAP_M

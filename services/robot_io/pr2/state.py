@@ -31,8 +31,10 @@ class CartState(msgspec.Struct, frozen=True, kw_only=True):
     """rad/s."""
     target: Vector
     """``x_desi`` (m); may be NaN."""
+    filtered: Vector
+    """``x_desi_filtered`` (m), which the spring pulls to; may be NaN."""
     is_target_finite: bool
-    """Whether the filtered target, which springs pull to, is made of numbers."""
+    """Whether that is made of numbers, its orientation too."""
     force: float
     """That the controller puts on the tool (N); may be NaN."""
 
@@ -69,6 +71,7 @@ def cart_state(message: Any, at: float, frame: str) -> CartState:
         velocity=velocity,
         spin=spin,
         target=_vector(message.x_desi.pose.position),
+        filtered=filtered.position,
         is_target_finite=all(map(math.isfinite, (*filtered.position, *filtered.orientation))),
         force=math.hypot(*_vector(message.F.force)),
     )

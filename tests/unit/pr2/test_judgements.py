@@ -159,37 +159,67 @@ def test_the_clocks_offset_is_the_least_delay_of_ten_seconds() -> None:
     assert offset.seconds(60.0) is None
 
 
-def test_a_target_that_was_not_sent_is_a_restart() -> None:
-    restarts = Restarts()
-    restarts.observe(1.00, (0.5, 0.0, 0.0))  # where it was when we came
+HERE = (0.5, 0.0, 0.0)
+
+
+def watched(*states: tuple[float, float], filtered: float = 0.5) -> Restarts:
+    """Return what was seen in states, each a stamp (s) and the x of a target (m)."""
+    restarts = Restarts(0.01)
     restarts.sent((0.6, 0.0, 0.0))
     restarts.sent((0.61, 0.0, 0.0))
-    restarts.observe(1.01, (0.5, 0.0, 0.0))
-    restarts.observe(1.02, (0.61, 0.0, 0.0))
+    for stamp, x in states:
+        restarts.observe(stamp, (x, 0.0, 0.0), (filtered, 0.0, 0.0))
+    return restarts
+
+
+def test_targets_that_were_sent_are_no_restart() -> None:
+    assert watched((1.0, 0.5), (1.01, 0.5), (1.02, 0.61), (1.03, 0.6), (1.04, 0.6)).generation == 0
+
+
+def test_a_target_that_was_not_sent_and_stays_is_one_restart() -> None:
+    found = watched((1.0, 0.5), (1.01, 0.61), (1.02, 0.58), (1.03, 0.58), (1.04, 0.58))
+    assert (found.generation, found.reason) == (1, "its target changed to what was not sent")
+
+
+def test_one_target_that_is_half_of_two_commands_is_none() -> None:
+    assert watched((1.0, 0.5), (1.01, 0.61), (1.02, 0.605), (1.03, 0.6)).generation == 0
+
+
+def test_another_commander_is_seen_between_our_own_commands() -> None:
+    states = [(1.0 + 0.01 * count, 0.6 if count % 2 else 0.3) for count in range(8)]
+    assert watched((0.99, 0.6), *states).generation >= 1
+
+
+def test_a_filtered_target_that_leaps_is_a_restart() -> None:
+    restarts = Restarts(0.01)
+    target = (0.6, 0.0, 0.0)
+    restarts.sent(target)
+    x, stamp = 0.5, 1.0
+    for _ in range(10):  # as the filter goes: 9.6 % of the way each 10 ms
+        restarts.observe(stamp, target, (x, 0.0, 0.0))
+        x, stamp = x + 0.096 * (0.6 - x), stamp + 0.01
     assert restarts.generation == 0
-    restarts.observe(1.03, (0.58, 0.0, 0.0))
-    assert (restarts.generation, restarts.reason) == (1, "its target changed to what was not sent")
-    restarts.observe(1.04, (0.58, 0.0, 0.0))
-    assert restarts.generation == 1
+    restarts.observe(stamp, target, (x - 0.03, 0.0, 0.0))
+    assert (restarts.generation, restarts.reason) == (1, "its filtered target leapt")
 
 
 def test_time_that_jumps_and_silence_are_restarts_a_late_loop_is_none() -> None:
-    restarts = Restarts()
+    restarts = Restarts(0.01)
     for count in range(20):
-        restarts.observe(1.0 + 0.01 * count, (0.5, 0.0, 0.0))
+        restarts.observe(1.0 + 0.01 * count, HERE, HERE)
     assert restarts.generation == 0
-    restarts.observe(1.5, (0.5, 0.0, 0.0))
+    restarts.observe(1.5, HERE, HERE)
     assert "silent for 0.31 s" in restarts.reason
-    restarts.observe(1.4, (0.5, 0.0, 0.0))
+    restarts.observe(1.4, HERE, HERE)
     assert "went back" in restarts.reason
     assert restarts.generation == 2
 
 
 def test_a_target_that_is_not_a_number_is_not_compared() -> None:
-    restarts = Restarts()
-    restarts.observe(1.0, (0.5, 0.0, 0.0))
-    restarts.observe(1.01, (math.nan, 0.0, 0.0))
-    restarts.observe(1.02, (math.nan, 0.0, 0.0))
+    restarts = Restarts(0.01)
+    poisoned = (math.nan, 0.0, 0.0)
+    for stamp, target in ((1.0, HERE), (1.01, poisoned), (1.02, poisoned), (1.03, HERE)):
+        restarts.observe(stamp, target, target)
     assert restarts.generation == 0
 
 
