@@ -20,6 +20,7 @@ from shared.messages.play import (
 from shared.messages.topics import BOUT, PLAYER
 from shared.messages.training import AGENTS, Agent
 
+OPERATOR = "a person at the page"
 ASK_SECONDS = 3.0
 """Longest wait for the referee or a policy."""
 MAX_RESULTS = 50
@@ -118,7 +119,8 @@ class Course:
         elif not is_on or state is None:
             self._tell("bout", False, ["no bout is on"])
         else:
-            self._ask_referee(PlayRequest(action=ask.action, bout=state.bout))
+            reason = f"{ask.action} by {OPERATOR}"
+            self._ask_referee(PlayRequest(action=ask.action, bout=state.bout, reason=reason))
 
     def tick(self, now: float) -> bool:
         """Go on; return whether the list of results has grown."""
@@ -216,7 +218,7 @@ class Course:
             self._note(state)
             self.step, self._until = "rest", now + self._cfg.rest
             return True
-        elif self.step == "bout" and self._asked_bout is None:
+        elif self.step == "bout":
             self.step = "idle"
         return False
 

@@ -5,7 +5,7 @@ from typing import Protocol
 
 from services.page import frames
 from services.page.config import PageConfig
-from services.page.course import ASK_SECONDS, Course, sides_of
+from services.page.course import ASK_SECONDS, OPERATOR, Course, sides_of
 from services.page.hearing import Hearing
 from services.page.protocol import Ask, BoutAsk, GateAsk, PlayerAsk, Pointer, StatsAsk
 from services.page.tracking import PointerTracker
@@ -16,7 +16,6 @@ from shared.messages.topics import ARM, TRACKER
 from shared.runtime.rate import Rate
 from shared.runtime.service import Health
 
-OPERATOR = "a person at the page"
 FRAME_PERIOD = 0.1
 """Without bat states, a frame goes out so often (s)."""
 PATIENCE, IDLE_PATIENCE = 0.002, 0.05

@@ -155,7 +155,7 @@ export class Hud {
     if (mode === "ramping") return ["", "The robot wakes up …", ""];
     if (this.hello?.pointer && frame.is_lost) return ["", "Start the bout", "Move the mouse over the scene to take your bat."];
     if (step === "rest") return ["start", "Rematch", `Well fenced. Rest for ${left} s, or go on at once.`];
-    if (referee?.phase === "void") return ["start", "Start a new bout", `The last bout is void: ${referee.reason}.`];
+    if (referee?.phase === "void") return ["start", "Start a new bout", `The last bout is void: ${referee.reason || "abandoned"}.`];
     return ["start", "Start the bout", "Reach the glowing sphere with your bat, and avoid the robot's."];
   }
 

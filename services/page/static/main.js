@@ -12,7 +12,7 @@ const canvas = $("scene");
 const hud = new Hud();
 const tones = new Tones();
 const quality = new URLSearchParams(location.search).get("quality") ?? "auto";
-const page = { frame: null, frameAt: 0, link: "lost", view: "player", action: "", perSecond: 0, device: "", grips: [] };
+const page = { frame: null, frameAt: 0, link: "lost", view: "player", action: "", perSecond: 0, device: "", bat: null };
 
 const link = new Link({
   hello: (said) => {
@@ -49,7 +49,7 @@ async function startScene() {
         [page.perSecond, page.device] = [data.perSecond, data.device];
         document.body.classList.toggle("plain", !data.isFine);
       }
-      else if (data.type === "grip") page.grips.push(data);
+      else if (data.type === "bat") page.bat = data;
       else if (data.type === "failed") hud.note({ lines: [`The scene cannot be drawn here: ${data.reason}`] });
     };
     worker.postMessage({ type: "start", canvas: offscreen, model, quality, ...size() }, [offscreen]);
@@ -154,8 +154,8 @@ window.riposte = {
     const [x, y] = seenAt(VIEWS[page.view], innerWidth / innerHeight, point);
     return [((x + 1) / 2) * innerWidth, ((1 - y) / 2) * innerHeight];
   },
-  askGrip: () => page.draw?.({ type: "grip" }),
-  grips: () => page.grips,
+  askBat: () => page.draw?.({ type: "bat" }),
+  bat: () => page.bat,
 };
 
 bind();

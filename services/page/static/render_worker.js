@@ -32,7 +32,7 @@ self.onmessage = ({ data }) => {
     scene.resize(data.width, data.height, data.ratio);
   } else if (data.type === "show") {
     scene.show(data.state, data.view);
-  } else if (data.type === "grip") {
-    postMessage({ type: "grip", ends: scene.kinematicGrip(), state: scene.state });
+  } else if (data.type === "bat") {
+    postMessage({ type: "bat", ends: scene.kinematicBat(), state: scene.state });
   }
 };

@@ -9,17 +9,20 @@ const COLOURS = [0xff6d1f, 0x2389ff]; // antagonist, protagonist
 const SLOW = /swiftshader|llvmpipe|software|basic render/i;
 const PLAIN_RATIO = 0.6; // pixels of the picture for each of the page, without a GPU
 const PLAIN_MS = 50; // from picture to picture there: the loop that moves the bats needs the processor
+const STILL_MS = 1000;
 
 const quaternion = ([w, x, y, z]) => new THREE.Quaternion(x, y, z, w);
 
 export class BoutScene {
-  /** canvas: HTML or offscreen; model: scene.json; quality: "fine", "plain" or "auto". */
+  /** canvas: HTML or offscreen; model: scene.json; quality: "fine", "plain", "auto", or "still", a
+   *  picture a second. */
   constructor(canvas, model, quality) {
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: quality !== "plain", powerPreference: "high-performance" });
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: quality === "fine" || quality === "auto", powerPreference: "high-performance" });
     const gl = this.renderer.getContext();
     const info = gl.getExtension("WEBGL_debug_renderer_info");
     this.device = String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
     this.isFine = quality === "fine" || (quality === "auto" && !SLOW.test(this.device));
+    this.restMs = this.isFine ? 0 : quality === "still" ? STILL_MS : PLAIN_MS;
     this.renderer.shadowMap.enabled = this.isFine;
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
     this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
@@ -109,7 +112,7 @@ export class BoutScene {
 
   /** Draw, if it is time to; return whether it was; now in ms. */
   draw(now) {
-    if (!this.isFine && now - this.drawnAt < PLAIN_MS) return false;
+    if (now - this.drawnAt < this.restMs) return false;
     const seconds = Math.min((now - this.drawnAt) / 1000, 0.1);
     this.drawnAt = now;
     this.moveCamera(seconds);
@@ -164,16 +167,14 @@ export class BoutScene {
     if (touches && this.tips.length === 2) this.spark.position.copy(this.tips[0]).lerp(this.tips[1], 0.5);
   }
 
-  /** Return where the model's own kinematics put the protagonist's bat: position of its grip (m). */
-  kinematicGrip() {
+  /** Return both ends of the axis of the protagonist's bat as the joints' angles have it (m). */
+  kinematicBat() {
     const hand = this.links.find(({ name }) => name === "protagonist/wrist_roll");
     const solid = this.model.solids.find(({ name }) => name === "protagonist/bat");
-    const { back, front } = this.model.bat;
     hand.group.updateWorldMatrix(true, false);
     const along = new THREE.Vector3(0, 0, 1).applyQuaternion(quaternion(solid.quaternion));
     const middle = new THREE.Vector3(...solid.position);
-    const ends = [1, -1].map((sign) => middle.clone().addScaledVector(along, sign * (back + front) / 2));
-    const hands = ends.map((end) => hand.group.localToWorld(end).toArray());
-    return hands;
+    const ends = [-1, 1].map((sign) => middle.clone().addScaledVector(along, sign * solid.size[1]));
+    return ends.map((end) => hand.group.localToWorld(end).toArray());
   }
 }

@@ -82,7 +82,7 @@ class Paging:
         self.players: list[str] = []
         self.gate_asked: list[str] = []
         self.refuse_bout = self.refuse_player = ""
-        self.is_policy_deaf = False
+        self.is_policy_deaf = self.is_referee_slow = False
         self.gate_reply = GateReply(accepted=True, mode="ramping")
         self.ticks = 0
         self.mode: Any = "armed"
@@ -147,7 +147,7 @@ class Paging:
         return [note for note in self.window.notes if note.get("about") == about]
 
     def _answer(self) -> None:
-        while (bout := self._bouts.take()) is not None:
+        while not self.is_referee_slow and (bout := self._bouts.take()) is not None:
             asked = bout.message
             self.bouts.append((asked.action, asked.bout, asked.antagonist, asked.protagonist))
             accepted = not self.refuse_bout

@@ -176,6 +176,17 @@ def test_a_void_bout_is_not_listed():
     assert site.course.results == []
 
 
+def test_an_abandoned_bout_is_over_even_if_its_state_overtakes_the_answer():
+    site, bout = running()
+    site.is_referee_slow = True
+    site.wish('{"type":"bout","action":"abandon"}')
+    site.referee("void", bout, reason="abandon by a person at the page")
+    assert site.course.step == "idle"
+    site.is_referee_slow = False
+    site.tick(3).wish(START)
+    assert site.course.step == "countdown"
+
+
 @pytest.mark.parametrize("action", ["pause", "resume", "abandon"])
 def test_the_running_bout_is_what_a_click_is_about(action: str):
     site, bout = running()
