@@ -5,6 +5,7 @@ import shutil
 from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -44,6 +45,17 @@ IN_BOUT = ("running", "paused")
 log = structlog.get_logger()
 
 
+class _Piece(NamedTuple):
+    """What was said in one stretch."""
+
+    serial: int
+    at: float
+    """When it ended (s)."""
+    rows: dict[str, Rows]
+    dropped: dict[str, int]
+    """Of each stream, before it."""
+
+
 class _Bout:
     """A bout that is being archived."""
 
@@ -57,7 +69,6 @@ class _Bout:
         self.journals: dict[str, Journal] = {}
         self.pending: list[dict[str, Rows]] = []
         self.last: RefereeState | None = None
-        self.heard_at = 0.0
         self.paused_at: float | None = None
         self.ends_at: float | None = None
 
@@ -96,8 +107,12 @@ class Archivist:
         self._folder = directory / "bouts"
         self._about = about
         self._bout: _Bout | None = None
-        self._ring: deque[tuple[int, float, dict[str, Rows]]] = deque()
+        self._ring: deque[_Piece] = deque()
+        self._dropped: dict[str, int] = {}
+        """Of each stream, at the latest piece."""
         self._serial = 0
+        self._given_up = ""
+        """A bout that cannot be archived, or no further."""
         self._write_due = 0.0
         self._work: deque[Iterator[None]] = deque()
         self.counters = {"bouts_archived": 0, "bouts_unarchived": 0, "archive_bytes": 0}
@@ -116,20 +131,22 @@ class Archivist:
             heard: rows of all streams.
             now: the monotonic clock (s).
         """
-        self._ring.append((self._serial, now, heard.rows))
+        self._ring.append(_Piece(self._serial, now, heard.rows, self._dropped))
         self._serial += 1
-        while self._ring[0][1] < now - LEAD_IN:
+        self._dropped = heard.dropped
+        while self._ring[0].at < now - LEAD_IN:
             self._ring.popleft()
         for state in heard.referee:
             self._follow(state, heard, now)
         bout = self._bout
         if bout is None:
             return
-        if now - bout.heard_at > SILENCE and bout.ends_at is None:
+        if now - heard.referee_at > SILENCE and bout.ends_at is None:
             self._end(bout, "interrupted", "the referee fell silent", now)
         is_asleep = bout.paused_at is not None and now - bout.paused_at > LONG_PAUSE
         if not is_asleep:
-            bout.pending += [rows for serial, _, rows in self._ring if serial >= bout.next_serial]
+            fresh = (piece for piece in self._ring if piece.serial >= bout.next_serial)
+            bout.pending += [piece.rows for piece in fresh]
             bout.next_serial = self._serial
         if now >= self._write_due:
             self._write_due = now + self._cfg.archive_period
@@ -163,7 +180,7 @@ class Archivist:
         is_own = bout is not None and bout.info.bout == state.bout and bout.ends_at is None
         if bout is not None and not is_own and bout.ends_at is None:
             self._end(bout, "interrupted", "the referee was restarted", now)
-        if state.phase in IN_BOUT and not is_own:
+        if state.phase in IN_BOUT and not is_own and state.bout != self._given_up:
             if bout is not None:
                 self._finish(bout, heard.dropped)
             bout = self._begin(state, heard)
@@ -171,7 +188,7 @@ class Archivist:
             return
         if bout is None:
             return
-        bout.last, bout.heard_at = state, now
+        bout.last = state
         if state.phase == "paused":
             bout.paused_at = now if bout.paused_at is None else bout.paused_at
         else:
@@ -202,9 +219,11 @@ class Archivist:
             folder = _new_folder(self._folder, state.bout)
             atomic_write(folder / INFO_FILE, _json(info))
         except (OSError, RiposteError) as error:
+            self._given_up = state.bout
             self._note_error(error)
             return None
-        self._bout = _Bout(folder, info, heard.dropped, self._ring[0][0])
+        oldest = self._ring[0]
+        self._bout = _Bout(folder, info, oldest.dropped, oldest.serial)
         self._write_due = 0.0
         log.info("archive_begun", bout=state.bout, folder=str(folder))
         return self._bout
@@ -214,7 +233,7 @@ class Archivist:
             bout.write()
         except OSError as error:
             bout.close()
-            self._bout = None
+            self._bout, self._given_up = None, bout.info.bout
             self._note_error(
                 RiposteError(f"the archive of bout {bout.info.bout} ended early: {error.strerror}")
             )

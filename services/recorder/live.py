@@ -34,8 +34,8 @@ LEVELS: dict[str, Level] = {"tripped": "ERROR", "holding": "WARN", "void": "WARN
 
 log = structlog.get_logger()
 
-_Piece = tuple[int, dict[str, Rows]]
-"""What is added to ticks, and rows by stream."""
+_Piece = dict[str, Rows]
+"""Rows by stream."""
 Say = Callable[[str, str, Level], None]
 """Adds a line to the log of events: source, text, level."""
 
@@ -121,10 +121,10 @@ class Live:
         pieces, self._rows = self._rows, []
         if not has_room:
             return
-        for first_tick, rows in pieces:
-            self._filed.curves(rows, first_tick)
-            self._filed.states(rows, first_tick)
-            self._scene_of(self._filed, rows, first_tick)
+        for rows in pieces:
+            self._filed.curves(rows)
+            self._filed.states(rows)
+            self._scene_of(self._filed, rows)
 
     def forget_file(self) -> None:
         """Let go of what was gathered for a file that has ended."""
@@ -173,9 +173,9 @@ class Live:
         if self._recording.has_live:
             thin = {name: self._thinned(rows) for name, rows in heard.rows.items()}
             thin = {name: rows for name, rows in thin.items() if len(rows)}
-            self._shown.curves(thin, heard.first_tick)
-            self._shown.states(heard.rows, heard.first_tick)
-            self._scene_of(self._shown, heard.rows, heard.first_tick)
+            self._shown.curves(thin)
+            self._shown.states(heard.rows)
+            self._scene_of(self._shown, heard.rows)
 
     def _gather(self, heard: Heard, now: float) -> None:
         """Keep for the file what belongs to a bout; of the time between bouts, the heart rate."""
@@ -183,28 +183,27 @@ class Live:
             self._files_until = now + LONG_PAUSE
         elif self._phase != "paused":
             self._files_until = min(self._files_until, now + LEAD_OUT)
-        piece = (heard.first_tick, heard.rows)
         if now < self._files_until:
-            self._rows += [*self._before, piece]
+            self._rows += [*self._before, heard.rows]
             self._before.clear()
             return
         if len(self._before) == self._before.maxlen:
-            first_tick, rows = self._before.popleft()
+            rows = self._before.popleft()
             if (beats := rows.get(HEART_RATE.name)) is not None:
-                self._rows.append((first_tick, {HEART_RATE.name: beats}))
-        self._before.append(piece)
+                self._rows.append({HEART_RATE.name: beats})
+        self._before.append(heard.rows)
 
-    def _scene_of(self, drawer: LiveDrawer, rows: dict[str, Rows], first_tick: int) -> None:
+    def _scene_of(self, drawer: LiveDrawer, rows: dict[str, Rows]) -> None:
         arms, bats = rows.get(ARMS.name), rows.get(BATS.name)
         has_person = False
         if arms is not None and len(arms := self._thinned(arms)):
             joints = np.stack(
                 [arms[f"{agent}_joint_positions"] for agent in self._scene.agents], axis=1
             )
-            drawer.bodies(arms, *self._kinematics.poses(joints), first_tick)
+            drawer.bodies(arms, *self._kinematics.poses(joints))
             has_person = not arms[f"{self._scene.agents[0]}_is_there"].any()
         if bats is not None and len(bats := self._thinned(bats)):
-            drawer.person(bats, first_tick, is_there=has_person)
+            drawer.person(bats, is_there=has_person)
 
     def _thinned(self, rows: Rows) -> Rows:
         """Return as many rows a second as are shown."""

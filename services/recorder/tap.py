@@ -35,8 +35,8 @@ class Heard:
     """By stream, since the start: messages that arrived and were thrown away."""
     boot: str
     """Of the robot_io heard last."""
-    first_tick: int
-    """Ticks of all earlier boots; what is added to a tick lies on one line through all of them."""
+    referee_at: float
+    """When the referee said anything last, things it had said before included (s)."""
 
 
 @dataclasses.dataclass
@@ -47,6 +47,7 @@ class _Ear:
     subscription: Subscription[Any]
     messages: list[Message] = dataclasses.field(default_factory=list[Message])
     heard_ns: list[int] = dataclasses.field(default_factory=list[int])
+    bases: list[int] = dataclasses.field(default_factory=list[int])
     last: object = None
     discarded: int = 0
 
@@ -85,8 +86,10 @@ class Tap:
         self._status_ns: list[int] = []
         self._times: OrderedDict[int, int] = OrderedDict()
         self._boot = ""
-        self._first_tick = 0
+        self._base = 0
+        """Ticks of all earlier boots."""
         self._last_tick = 0
+        self._referee_at = -1e9
         self.heard_at = -1e9
         """When bat states came last (s)."""
 
@@ -121,15 +124,15 @@ class Tap:
             if not ear.messages:
                 continue
             times = [self._time_of(m, ns) for m, ns in zip(ear.messages, ear.heard_ns, strict=True)]
-            found[ear.stream.name] = rows_of(ear.stream, ear.messages, times)
+            found[ear.stream.name] = rows_of(ear.stream, ear.messages, times, ear.bases)
             if ear.stream is streams.REFEREE:
                 referee = tuple(cast(RefereeState, message) for message in ear.messages)
-            ear.messages, ear.heard_ns = [], []
+            ear.messages, ear.heard_ns, ear.bases = [], [], []
         if self._statuses:
             name = streams.SERVICES.name
             found[name] = rows_of(streams.SERVICES, self._statuses, self._status_ns)
             self._statuses, self._status_ns = [], []
-        return Heard(found, referee, self.dropped, self._boot, self._first_tick)
+        return Heard(found, referee, self.dropped, self._boot, self._referee_at)
 
     def close(self) -> None:
         """Stop listening."""
@@ -137,6 +140,8 @@ class Tap:
             ear.subscription.close()
 
     def _keep(self, ear: _Ear, message: Message, wall_ns: int) -> None:
+        if ear.stream is streams.REFEREE:
+            self._referee_at = self._clock.now()
         mark = _MARKS.get(ear.stream.name, _itself)(message)
         if mark is not message and mark == ear.last:
             return  # a value that is sent again every second
@@ -148,11 +153,12 @@ class Tap:
             return
         ear.messages.append(message)
         ear.heard_ns.append(wall_ns)
+        ear.bases.append(self._base)
 
     def _note_tick(self, states: BatStates) -> None:
         self.heard_at = self._clock.now()
         if states.boot != self._boot:
-            self._first_tick += self._last_tick + 1 if self._boot else 0
+            self._base += self._last_tick + 1 if self._boot else 0
             self._boot = states.boot
             self._times.clear()
         self._last_tick = states.tick

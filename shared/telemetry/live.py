@@ -23,10 +23,10 @@ from shared.telemetry.streams import (
     BATS,
     GATE,
     HEART_RATE,
+    LINE,
     OFFSETS,
     REFEREE,
     ROBOT,
-    TICK,
     TIME,
     TRACKER,
     Rows,
@@ -156,18 +156,17 @@ class LiveDrawer:
         self._poses: Array | None = None
         self._states: dict[str, str] = {}
 
-    def curves(self, rows: Mapping[str, Rows], first_tick: int) -> None:
+    def curves(self, rows: Mapping[str, Rows]) -> None:
         """Send every row of every stream.
 
         Args:
-            rows: by stream.
-            first_tick: what is added to a tick, so that boots lie end to end.
+            rows: by stream, as they were heard.
         """
         for series in SERIES:
             found = rows.get(series.stream)
             if found is None or (series.only_with and not found[series.only_with].any()):
                 continue
-            times = self._times(found, first_tick)
+            times = self._times(found)
             if series.kind == "pose":
                 position, turn = (found[name] for name in series.columns)
                 xyzw = turn[:, [1, 2, 3, 0]]
@@ -176,14 +175,13 @@ class LiveDrawer:
                 columns = _scalars(found, series)
             self._recording.columns(self._to, series.path, times, columns)
 
-    def bodies(self, arms: Rows, positions: Array, quaternions: Array, first_tick: int) -> None:
+    def bodies(self, arms: Rows, positions: Array, quaternions: Array) -> None:
         """Send the poses of all bodies; those of a side that no robot plays are out of sight.
 
         Args:
             arms: F rows of joints.
             positions: float32[F, B, 3] (m), of these joints.
             quaternions: float32[F, B, 4], w x y z.
-            first_tick: as for ``curves``.
         """
         names = self._scene.body_names
         placed = positions.copy()
@@ -203,15 +201,14 @@ class LiveDrawer:
             quaternion=quaternions[row, body][:, [1, 2, 3, 0]],
             child_frame=[names[b] for _, b in pairs],
         )
-        times = self._times(arms.pick(row), first_tick)
+        times = self._times(arms.pick(row))
         self._recording.columns(self._to, paths.POSES, times, columns)
 
-    def person(self, bats: Rows, first_tick: int, *, is_there: bool) -> None:
+    def person(self, bats: Rows, *, is_there: bool) -> None:
         """Send where the antagonist's bat is, if a person holds it.
 
         Args:
             bats: F rows of bat states.
-            first_tick: as for ``curves``.
             is_there: whether a person plays.
         """
         rows = bats if is_there else bats.pick(slice(0, 1))
@@ -224,34 +221,33 @@ class LiveDrawer:
             quaternion=turn[:, [1, 2, 3, 0]],
             child_frame=[PERSON_BAT] * len(rows),
         )
-        self._recording.columns(self._to, paths.POSES, self._times(rows, first_tick), columns)
+        self._recording.columns(self._to, paths.POSES, self._times(rows), columns)
 
-    def states(self, rows: Mapping[str, Rows], first_tick: int) -> None:
+    def states(self, rows: Mapping[str, Rows]) -> None:
         """Send where phase, gate, tracking, in target, contact and the target's colour change.
 
         Args:
             rows: by stream; all of them, for a touch may last one row.
-            first_tick: as for ``curves``.
         """
         if (said := rows.get(REFEREE.name)) is not None:
             phase = np.where(np.isin(said["phase"], [*PHASES]), said["phase"], "")
-            self._state(PHASE_PATH, said, first_tick, phase)
+            self._state(PHASE_PATH, said, phase)
             inside = [said[f"{agent}_in_target"] for agent in AGENTS]
             for agent, is_inside in zip(AGENTS, inside, strict=True):
                 state = np.where(is_inside, "in target", "")
-                self._state(paths.in_target_path(agent), said, first_tick, state)
+                self._state(paths.in_target_path(agent), said, state)
             touch = np.where(said["contact"], "touch", "")
-            self._state(paths.CONTACT, said, first_tick, touch)
-            self._target(said, first_tick, inside)
+            self._state(paths.CONTACT, said, touch)
+            self._target(said, inside)
         if (gate := rows.get(GATE.name)) is not None:
             mode = np.where(np.isin(gate["mode"], [*MODES]), gate["mode"], "")
-            self._state(GATE_PATH, gate, first_tick, mode)
+            self._state(GATE_PATH, gate, mode)
         if (bats := rows.get(BATS.name)) is not None:
             for agent in AGENTS:
                 state = np.where(bats[f"{agent}_is_valid"], "", "lost")
-                self._state(tracked_path(agent), bats, first_tick, state)
+                self._state(tracked_path(agent), bats, state)
 
-    def _target(self, said: Rows, first_tick: int, inside: Sequence[Array]) -> None:
+    def _target(self, said: Rows, inside: Sequence[Array]) -> None:
         state = np.select(
             [inside[0] & said["contact"], inside[0], inside[1]],
             ["penalty", "scores", "guarded"],
@@ -259,14 +255,14 @@ class LiveDrawer:
         )
         if kept := self._changes(paths.TARGET, state):
             colours = [TARGET_COLOURS[str(state[k])] for k in kept]
-            times = self._times(said.pick(np.array(kept)), first_tick)
+            times = self._times(said.pick(np.array(kept)))
             columns = rr.Ellipsoids3D.columns(colors=colours)
             self._recording.columns(self._to, paths.TARGET, times, columns)
 
-    def _state(self, path: str, rows: Rows, first_tick: int, state: Array) -> None:
+    def _state(self, path: str, rows: Rows, state: Array) -> None:
         if kept := self._changes(path, state):
             columns = rr.StateChange.columns(state=[str(state[k]) for k in kept])
-            times = self._times(rows.pick(np.array(kept)), first_tick)
+            times = self._times(rows.pick(np.array(kept)))
             self._recording.columns(self._to, path, times, columns)
 
     def _changes(self, path: str, state: Array) -> list[int]:
@@ -280,11 +276,11 @@ class LiveDrawer:
         self._states[path] = last or ""
         return kept
 
-    def _times(self, rows: Rows, first_tick: int) -> list[rr.TimeColumn]:
+    def _times(self, rows: Rows) -> list[rr.TimeColumn]:
         wall = rr.TimeColumn(paths.WALL_TIME, timestamp=rows[TIME].astype("datetime64[ns]"))
-        if TICK not in rows.columns:
+        if LINE not in rows.columns:
             return [wall]
-        steps = rows[TICK] + first_tick
+        steps = rows[LINE]
         return [
             rr.TimeColumn(paths.CONTROL_STEP, sequence=steps),
             rr.TimeColumn(paths.BOUT_TIME, duration=steps * self._scene.control_timestep),

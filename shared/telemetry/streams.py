@@ -36,6 +36,8 @@ LOOP_HZ = 100.0
 """Ticks of robot_io a second."""
 TIME = "t_ns"
 TICK = "tick"
+LINE = "control_step"
+"""Of rows that were heard, not of archived ones: the tick on a line through all boots."""
 PERSON = "person"
 """Who plays a side that no policy does."""
 
@@ -116,18 +118,23 @@ class Rows:
         return Rows({name: np.concatenate([part[name] for part in parts]) for name in names})
 
 
-def rows_of(stream: Stream, messages: Sequence[Message], t_ns: Sequence[int]) -> Rows:
+def rows_of(
+    stream: Stream, messages: Sequence[Message], t_ns: Sequence[int], bases: Sequence[int] = ()
+) -> Rows:
     """Return messages as rows.
 
     Args:
         stream: whose messages they are.
         messages: in the order they came.
         t_ns: the wall clock of each.
+        bases: what is added to the tick of each for its place on the line, where it has one.
     """
     columns: dict[str, Array] = {TIME: np.array(t_ns, np.int64)}
     for column in stream.columns:
         if column.name != TIME:
             columns[column.name] = column.array(messages)
+    if stream.has_tick:
+        columns[LINE] = columns[TICK] + (np.array(bases, np.int64) if bases else 0)
     return Rows(columns)
 
 

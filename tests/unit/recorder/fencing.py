@@ -50,8 +50,9 @@ class Fencing:
     def __init__(
         self, folder: Path, cfg: RecorderConfig = ONLY_FILE, *, person: bool = False,
         rules: RuleBook = RULES, hub: MemoryHub | None = None,
+        clock: ManualClock | None = None,
     ) -> None:  # fmt: skip
-        self.clock = ManualClock(1_700_000_000.0)
+        self.clock = clock or ManualClock(1_700_000_000.0)
         self.hub = hub or MemoryHub(self.clock)
         self.bus = self.hub.join("robot-io-0", BOOT)
         sim = SimConfig()
@@ -63,6 +64,7 @@ class Fencing:
         self.person = person
         self.boot = BOOT
         self.tick = -1
+        self.is_recorder_held_up = self.is_referee_gone = False
         self.state: RefereeState | None = None
 
     def replace_recorder(self, folder: Path, cfg: RecorderConfig = ONLY_FILE) -> None:
@@ -79,8 +81,12 @@ class Fencing:
         if not lost:
             self._say(bats, valid=valid)
         self.clock.advance(0.01)
-        self.referee.tick()
-        self.recorder.tick()
+        if not self.is_referee_gone:
+            self.referee.tick()
+            if self.tick % 100 == 0:  # as a real bus does every second
+                self.bus.publish(topics.REFEREE, self.referee.state())
+        if not self.is_recorder_held_up:
+            self.recorder.tick()
         while (state := self.said.take()) is not None:
             self.state = state
 
