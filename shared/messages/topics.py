@@ -140,11 +140,11 @@ FRAMES = Topic(
     "a sampled bout to look at",
 )
 BATS = Topic(
-    "play/bats", BatStates, Qos.STREAM, 4 * KIB, "robot_io", "policy, referee, recorder",
+    "play/bats", BatStates, Qos.STREAM, 4 * KIB, "robot_io", "policy, referee, page, recorder",
     "both bats, 100 a second",
 )
 ARMS = Topic(
-    "play/arms", ArmStates, Qos.STREAM, 4 * KIB, "robot_io", "play, recorder",
+    "play/arms", ArmStates, Qos.STREAM, 4 * KIB, "robot_io", "page, recorder",
     "joints of the robots that play",
 )
 ROBOT = Topic(
@@ -152,7 +152,7 @@ ROBOT = Topic(
     "forces, efforts and troubles of the robot",
 )
 TRACKER = Topic(
-    "play/tracker", TrackerPose, Qos.STREAM, 4 * KIB, "play", "robot_io, recorder",
+    "play/tracker", TrackerPose, Qos.STREAM, 4 * KIB, "page", "robot_io, recorder",
     "a person's bat, from a page",
 )
 TRACKER_RAW = Topic(
@@ -164,27 +164,27 @@ OFFSET = Topic(
     "where the tool should go from here",
 )
 REFEREE = Topic(
-    "play/referee", RefereeState, Qos.LATEST, 4 * KIB, "referee", "robot_io, recorder, play",
+    "play/referee", RefereeState, Qos.LATEST, 4 * KIB, "referee", "robot_io, recorder, page, play",
     "phase, score and tone of the bout",
 )
 GATE = Topic(
-    "play/gate", GateState, Qos.LATEST, 4 * KIB, "robot_io", "play, recorder, status",
+    "play/gate", GateState, Qos.LATEST, 4 * KIB, "robot_io", "page, play, recorder, status",
     "mode of the safety gate and what it sent",
 )
 HEART_RATE = Topic(
-    "play/heart_rate", HeartRate, Qos.STREAM, 4 * KIB, "robot_io", "recorder, play",
+    "play/heart_rate", HeartRate, Qos.STREAM, 4 * KIB, "robot_io", "recorder, page",
     "of the person who plays",
 )
 BOUT = Service(
-    "play/bout", PlayRequest, PlayReply, 4 * KIB, 4 * KIB, "play", "referee",
+    "play/bout", PlayRequest, PlayReply, 4 * KIB, 4 * KIB, "page, play", "referee",
     "starts, pauses and ends a bout",
 )
 PLAYER = Service(
-    "play/{agent}/player", PlayerRequest, PlayerReply, 4 * KIB, 4 * KIB, "play", "policy",
+    "play/{agent}/player", PlayerRequest, PlayerReply, 4 * KIB, 4 * KIB, "page", "policy",
     "who plays a side from the next bout on",
 )
 ARM = Service(
-    "play/arm", GateRequest, GateReply, 4 * KIB, 16 * KIB, "play", "robot_io",
+    "play/arm", GateRequest, GateReply, 4 * KIB, 16 * KIB, "page, play, robot", "robot_io",
     "a person arms or disarms the robot",
 )
 

@@ -8,7 +8,7 @@ const BEST = 5;
 const GATE_WORDS = {
   disarmed: "does not move until somebody arms it.",
   ramping: "is being woken up, slowly.",
-  armed: "fences.",
+  armed: "is armed, and holds still without a bout.",
   holding: "stands still for a moment",
   tripped: "was stopped for safety",
 };
@@ -94,6 +94,7 @@ export class Hud {
     mark("gate", gate?.mode ?? "");
     put("gate-mode", gate?.mode ?? "robot");
     let words = gate ? `The robot ${GATE_WORDS[gate.mode]}` : "not heard of yet";
+    if (gate?.mode === "armed" && frame.step === "bout") words = "The robot fences.";
     if (gate?.reason && (gate.mode === "holding" || gate.mode === "tripped")) words += `: ${gate.reason}.`;
     put("gate-words", words);
     $("disarm").hidden = !gate || gate.mode === "disarmed" || gate.mode === "tripped";
@@ -190,9 +191,8 @@ export class Hud {
     }));
   }
 
-  note({ is_done: isDone, lines, about }) {
-    const words = lines.length ? lines : isDone && about === "gate" ? [] : [];
-    for (const line of words) {
+  note({ is_done: isDone, lines }) {
+    for (const line of lines) {
       const row = document.createElement("li");
       row.textContent = line;
       row.className = isDone ? "good" : "";
