@@ -1,0 +1,51 @@
+"""kill -9 of what a moving robot depends on: it stops, that is said, and nobody moves it again."""
+
+from pathlib import Path
+
+import pytest
+
+from services import cli
+from tests.integration.play_job.playing import onlooking, playing
+from tests.integration.training.training import processes_of
+
+pytestmark = [pytest.mark.chaos, pytest.mark.zenoh, pytest.mark.timeout(300)]
+
+STOPPED = ("disarmed", "tripped")
+
+
+@pytest.mark.parametrize(
+    "victim", ["policy-protagonist", "policy-antagonist", "referee-0", "robot-io-0", "router-0"]
+)
+def test_the_robot_stops_and_moves_again_only_when_it_is_armed(
+    tmp_path: Path, victim: str, capsys: pytest.CaptureFixture[str]
+):
+    folder = tmp_path / "match"
+    players = ("--antagonist", "scripted:slash", "--protagonist", "heuristic")
+    with playing(folder, *players) as match, onlooking(match) as onlooker:
+        onlooker.until(onlooker.is_fencing)
+        boot = onlooker.states[-1].boot
+        bouts = {state.bout for state in onlooker.referee}
+        count = len(onlooker.gates)
+
+        match.kill(victim)
+        onlooker.until(lambda: f"{victim} died (killed by SIGKILL)" in match.said)
+        onlooker.until(lambda: len(onlooker.gates) > count + 20 and onlooker.mode in STOPPED)
+        onlooker.until(lambda: f"robot {onlooker.mode}" in match.said)
+        assert "until somebody arms it: riposte robot arm" in match.said or victim == "robot-io-0"
+
+        begin = len(onlooker.states)
+        onlooker.rest(6.0)  # everybody is back, policies answer, and nothing moves
+        assert len(onlooker.states) > begin + 100
+        assert onlooker.travel(begin + 50) < 0.002
+        assert onlooker.mode in STOPPED
+        assert {state.bout for state in onlooker.referee} <= bouts | {""}
+        assert (onlooker.states[-1].boot == boot) == (victim != "robot-io-0")
+
+        if onlooker.mode == "tripped":
+            assert cli.main(["robot", "arm", "--run", str(folder)]) == 1
+            assert "reset it first" in capsys.readouterr().out
+            assert cli.main(["robot", "reset", "--run", str(folder)]) == 0
+        assert cli.main(["robot", "check", "--run", str(folder)]) == 0, capsys.readouterr().out
+        assert cli.main(["robot", "arm", "--run", str(folder)]) == 0
+        onlooker.until(lambda: onlooker.is_fencing() and onlooker.referee[-1].bout not in bouts)
+    assert processes_of(folder) == []
