@@ -80,6 +80,7 @@ class Tap:
                 for agent in AGENTS
             ),
             _Ear(streams.TRACKER, _every(bus, topics.TRACKER)),
+            _Ear(streams.TRACKER_RAW, _every(bus, topics.TRACKER_RAW)),
             _Ear(streams.HEART_RATE, _every(bus, topics.HEART_RATE)),
         ]
         self._statuses: list[ServiceStatus] = []

@@ -116,7 +116,8 @@ class RobotIoConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     """Who plays against it: a second policy, the mouse of a browser, a Vive tracker on a person's
     bat (section ``[vive]``), or a recorded bat."""
     replay: str = ""
-    """File of the recorded bat: float64[T, 14] as .npy, a time (s) and 13 numbers each row."""
+    """The recorded bat: a .npy file, float64[T, 14], a time (s) and 13 numbers each row; or the
+    folder of an archived bout, RUN/bouts/NAME."""
     answer_wait: float = 0.005
     """Longest wait for the policy's answer within a tick before the command goes out (s)."""
     return_home: bool = True

@@ -20,11 +20,10 @@ from services.robot_io.poses import (
     turned,
     unit,
 )
+from services.robot_io.replays import read_replay
 from shared.bus.base import Bus
-from shared.errors import ConfigError
 from shared.messages.topics import TRACKER
 
-BAT = 13
 EXTRAPOLATED_SECONDS = 0.05
 """A bat that was not seen for so long is still taken to move on as it did."""
 LOST_SECONDS = 0.1
@@ -226,27 +225,12 @@ class ReplayTracker(_Exact):
 
     @staticmethod
     def load(path: Path) -> "ReplayTracker":
-        """Read a recording.
+        """Read a recording: a ``.npy`` file, or the folder of an archived bout.
 
         Raises:
-            ConfigError: the file cannot be read, or is no recording of a bat.
+            ConfigError: it cannot be read, or is no recording of a bat.
         """
-        try:
-            loaded = np.load(path, allow_pickle=False)
-            rows = np.asarray(loaded, np.float64)
-        except (OSError, ValueError, TypeError) as error:
-            raise ConfigError(f"cannot read the recorded bat {path}: {error}") from error
-        if rows.ndim != 2 or rows.shape[1] != BAT + 1 or len(rows) < 2:
-            raise ConfigError(
-                f"{path} has the shape {rows.shape}, expected [T, 14] with T of at least 2: "
-                "a time (s) and the 13 numbers of a bat's state"
-            )
-        lengths = np.linalg.norm(rows[:, 4:8], axis=1)
-        if not np.isfinite(rows).all() or np.any(np.diff(rows[:, 0]) <= 0.0):
-            raise ConfigError(f"{path} has a number that is not finite, or times that do not rise")
-        if np.any(np.abs(lengths - 1.0) > 0.01):
-            raise ConfigError(f"{path} has an orientation that is not of unit length")
-        return ReplayTracker(rows)
+        return ReplayTracker(read_replay(path))
 
     def read(self, now: float) -> TrackedBat:
         """Return the last recorded state before now."""

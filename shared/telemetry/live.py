@@ -29,6 +29,7 @@ from shared.telemetry.streams import (
     ROBOT,
     TIME,
     TRACKER,
+    TRACKER_RAW,
     Rows,
 )
 
@@ -111,6 +112,7 @@ SERIES: tuple[Series, ...] = (
     Series(REFEREE.name, TONE, ("tone_hz",), ("tone",)),
     Series(TRACKER.name, "bout/tracker", ("position", "orientation"), kind="pose"),
     Series(TRACKER.name, "bout/tracker/is_valid", ("is_valid",)),
+    Series(TRACKER_RAW.name, "bout/tracker_raw", ("position", "orientation"), kind="pose"),
     Series(HEART_RATE.name, HEART_PATH, ("beats_per_minute",), ("heart rate",)),
 )  # fmt: skip
 

@@ -23,6 +23,7 @@ from shared.messages.play import (
     TrackerPose,
 )
 from shared.messages.robot import RobotReport
+from shared.messages.tracking import TrackerRaw
 from shared.messages.training import AGENTS
 
 Kind = Literal["float", "int", "bool", "text"]
@@ -235,6 +236,8 @@ BATS = Stream(
     (
         _AT_TICK, _TICK, _BOOT,
         _number("seconds", "s", "game time; 0 outside a bout"),
+        _text("tracker_source", "of the newest tracker row in the antagonist's state"),
+        _count("tracker_sequence", "of the same row; -1 where there is none"),
         *(column for side, agent in enumerate(AGENTS) for column in _bat(side, agent)),
     ),
 )  # fmt: skip
@@ -331,6 +334,17 @@ TRACKER = Stream(
     ),
     has_tick=False,
 )  # fmt: skip
+TRACKER_RAW = Stream(
+    "tracker_raw", "a Vive tracker in the base stations' frame, before calibration", 0.0,
+    (
+        _time("when the tracker said it"),
+        _text("serial", "of the tracker"),
+        Column("position", "m", "float", "x y z", _part("pose", slice(0, 3)), 3),
+        Column("orientation", "1", "float", "quaternion w x y z", _part("pose", slice(3, 7)), 4),
+        _flag("is_valid", "the base stations see it"),
+    ),
+    has_tick=False,
+)  # fmt: skip
 HEART_RATE = Stream(
     "heart_rate", "of the person who plays", 1.0,
     (
@@ -359,7 +373,8 @@ SERVICES = Stream(
 )  # fmt: skip
 
 STREAMS: tuple[Stream, ...] = (
-    BATS, ARMS, ROBOT, GATE, REFEREE, *OFFSETS.values(), TRACKER, HEART_RATE, SERVICES,
+    BATS, ARMS, ROBOT, GATE, REFEREE, *OFFSETS.values(), TRACKER, TRACKER_RAW,
+    HEART_RATE, SERVICES,
 )  # fmt: skip
 BY_NAME = {stream.name: stream for stream in STREAMS}
 MESSAGES: dict[str, type[Message]] = {
@@ -370,6 +385,7 @@ MESSAGES: dict[str, type[Message]] = {
     REFEREE.name: RefereeState,
     **{stream.name: DesiredOffset for stream in OFFSETS.values()},
     TRACKER.name: TrackerPose,
+    TRACKER_RAW.name: TrackerRaw,
     HEART_RATE.name: HeartRate,
     SERVICES.name: ServiceStatus,
 }

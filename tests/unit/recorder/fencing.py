@@ -33,6 +33,7 @@ from shared.messages.play import (
     TrackerPose,
 )
 from shared.messages.robot import RobotReport
+from shared.messages.tracking import TrackerRaw
 from shared.sim.arena import bat_of, target_of
 from shared.sim.config import SimConfig
 from shared.sim.model import FencingModel
@@ -97,6 +98,8 @@ class Fencing:
         say(topics.BATS, BatStates(
             tick=tick, boot=boot, at_ns=now, bats=bats, tools=TOOLS,
             is_valid=np.array([valid, True]), seconds=0.0,
+            tracker_source="page" if self.person else "",
+            tracker_sequence=tick if self.person else -1,
         ))  # fmt: skip
         joints = MODEL.en_garde + 0.1 * np.sin(phase)
         if self.person:
@@ -117,6 +120,9 @@ class Fencing:
             ), agent=agent)  # fmt: skip
         if self.person:
             say(topics.TRACKER, TrackerPose(sequence=tick, source="page", pose=bats[0, :7]))
+            say(topics.TRACKER_RAW, TrackerRaw(
+                at_ns=now, serial="LHR-1", pose=bats[0, :7], is_valid=valid,
+            ))  # fmt: skip
         say(topics.GATE, GateState(
             tick=tick, mode="armed", commanded=TOOLS[1],
             is_clipped=tick % 7 == 0, is_sent=True, lateness_ms=0.2, late_ticks=0,

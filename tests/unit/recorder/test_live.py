@@ -11,9 +11,10 @@ from rerun.chunk import RrdReader
 
 from services.recorder.config import RecorderConfig
 from services.recorder.tap import Tap
+from services.robot_io.trackers import ReplayTracker
 from shared.bus.memory import MemoryHub
 from shared.clock import ManualClock
-from shared.errors import RiposteError
+from shared.errors import ConfigError, RiposteError
 from shared.game.rules import RuleBook
 from shared.messages import topics
 from shared.messages.play import GateState
@@ -68,7 +69,7 @@ def test_every_stream_is_in_the_recording_at_its_rate(tmp_path: Path, person: bo
         if not chunk.is_static:
             times = chunk.to_record_batch().column("wall_time").cast("int64").to_pylist()
             found[chunk.entity_path.removeprefix("/")] += [1e-9 * when for when in times]
-    absent = {"antagonist_offsets"} if person else {"tracker"}
+    absent = {"antagonist_offsets"} if person else {"tracker", "tracker_raw"}
     for series in SERIES:
         if series.stream in absent or (person and series.only_with == "antagonist_is_there"):
             assert series.path not in found
@@ -108,7 +109,7 @@ def test_the_archive_holds_every_number_with_its_unit_and_its_provenance(tmp_pat
     bout = load_bout(archived_bouts(tmp_path)[0])
     info = bout.info
 
-    assert set(bout.streams) == {stream.name for stream in STREAMS} - {"tracker"}
+    assert set(bout.streams) == set(BY_NAME) - {"tracker", "tracker_raw"}
     ticks = bout.streams["bats"]["tick"]
     start = 120
     bats = bout.bats()
@@ -277,6 +278,26 @@ def test_ticks_of_a_restarted_robot_io_lie_behind_the_ones_before(tmp_path: Path
     assert (np.diff(np.array(steps["control_step"])[order]) > 0).all()
     boots = [load_bout(folder).info.robot_io_boot for folder in archived_bouts(tmp_path)]
     assert boots == [BOOT, "fedcba9876543210"]
+
+
+def test_a_recorded_bat_is_replayed_from_the_archive(tmp_path: Path):
+    fencing = Fencing(tmp_path, ONLY_ARCHIVE, rules=RULES)
+    fencing.start("one", EN_GARDE)
+    for step in range(RULES.bout_steps):
+        fencing.bring(moving(step), lost=step == 60, valid=step != 90)
+    fencing.recorder.close()
+    folder = archived_bouts(tmp_path)[0]
+    tracker = ReplayTracker.load(folder)
+    tracker.read(5.0)  # from the tick at which the bout was started, one before its first step
+    for step, shown in ((10, 10), (60, 59), (90, 89), (91, 91), (180, 180)):
+        found = tracker.read(5.0 + 0.01 * (step + 1))
+        np.testing.assert_array_equal(found.state, moving(shown)[0])
+        assert found.is_valid
+    damaged(folder, "bats.parquet")
+    with pytest.raises(ConfigError, match=r"cannot replay .*one: .*bats.parquet is no stream"):
+        ReplayTracker.load(folder)
+    with pytest.raises(ConfigError, match=r"cannot replay .*is no archived bout"):
+        ReplayTracker.load(tmp_path)
 
 
 def damaged(folder: Path, name: str) -> None:
