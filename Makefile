@@ -13,7 +13,7 @@ export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help train test check format test-all chaos bench docs clean
+.PHONY: help train test check format test-all slow chaos bench docs clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -39,6 +39,9 @@ test: $(STAMP) ## unit, property, integration and replay tests
 
 test-all: $(STAMP) ## every test that needs no robot
 	@$(BIN)/pytest -q -m "not hardware and not gpu" tests $(TEST_FLAGS)
+
+slow: $(STAMP) ## whole runs, the quick budget of both phases among them
+	@$(BIN)/pytest -q -m slow tests $(TEST_FLAGS)
 
 chaos: $(STAMP) ## tests that kill, delay and lose things
 	@$(BIN)/pytest -q -m chaos tests $(TEST_FLAGS)

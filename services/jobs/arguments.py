@@ -5,8 +5,10 @@ import datetime
 from collections.abc import Sequence
 from pathlib import Path
 
-from services.jobs.runs import state_of
+from services.jobs.runs import LEDGER, state_of
 from services.jobs.settings import BUDGETS, Settings
+from services.league.events import RunStarted
+from services.league.ledger import open_read_only
 from services.league.rounds import phase_one_done
 from services.league.sampling import SAMPLERS
 from services.league.schedule import next_event
@@ -75,7 +77,22 @@ def folder_of(found: argparse.Namespace) -> tuple[Path, str]:
     else:
         stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
         folder = Path("runs") / f"train-{stamp}"
-    return folder, run_id_of(folder)
+    return folder, run_of(folder)
+
+
+def run_of(folder: Path) -> str:
+    """Return the name of the run in a folder: its ledger's, whatever the folder is called by now.
+
+    Raises:
+        LedgerError: the ledger is damaged, or another program's.
+    """
+    if (folder / LEDGER).exists():
+        with open_read_only(folder / LEDGER) as ledger:
+            for entry in ledger.replay():
+                if isinstance(entry.event, RunStarted):
+                    return entry.event.run
+                break
+    return run_id_of(folder)
 
 
 def settings_of(found: argparse.Namespace, folder: Path) -> Settings:

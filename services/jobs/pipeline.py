@@ -17,6 +17,7 @@ from shared.runtime.files import atomic_write
 FILE = "pipeline.json"
 JOBS = (("tournament", "services.jobs.tournament"), ("styles", "services.jobs.styles"))
 """Name and module of each stage; ``main([RUN])`` plays it."""
+REPORT = "report"
 
 
 class StageTime(msgspec.Struct, frozen=True, kw_only=True):
@@ -41,6 +42,11 @@ class Pipeline(msgspec.Struct, frozen=True, kw_only=True):
         known = {stage.name: stage for stage in self.stages}
         return known.get(name, StageTime(name=name, seconds=0.0, done=False))
 
+    def replaced(self, stage: StageTime) -> "Pipeline":
+        """Return the same with a stage as it is now."""
+        others = tuple(other for other in self.stages if other.name != stage.name)
+        return msgspec.structs.replace(self, stages=(*others, stage))
+
 
 def is_begun(folder: Path) -> bool:
     """Return whether this run was begun with its whole pipeline."""
@@ -59,18 +65,27 @@ def write(folder: Path, pipeline: Pipeline) -> None:
     atomic_write(folder / FILE, msgspec.json.format(msgspec.json.encode(pipeline)) + b"\n")
 
 
-def run_jobs(folder: Path, position: int, jobs: Sequence[tuple[str, str]] = JOBS) -> int:
+def run_jobs(
+    folder: Path,
+    position: int,
+    jobs: Sequence[tuple[str, str]] = JOBS,
+    *,
+    report_seconds: float = 0.0,
+) -> int:
     """Do what is left after training; return the exit code of the first that fails, else 0.
 
     Args:
         folder: of the run.
         position: of its ledger; when it has moved, everything after training is done again.
         jobs: name and module of each stage.
+        report_seconds: how long the report of the training took; one like it is written at the
+            end.
     """
     found = read(folder)
     if found.position != position:
         found = Pipeline(position=position)
-        write(folder, found)
+    found = found.replaced(StageTime(name=REPORT, seconds=report_seconds, done=True))
+    write(folder, found)
     for name, module in jobs:
         stage = found.find(name)
         if stage.done:
@@ -82,8 +97,7 @@ def run_jobs(folder: Path, position: int, jobs: Sequence[tuple[str, str]] = JOBS
         finally:
             seconds = stage.seconds + time.monotonic() - began
             after = StageTime(name=name, seconds=seconds, done=code == 0)
-            others = tuple(other for other in found.stages if other.name != name)
-            found = msgspec.structs.replace(found, stages=(*others, after))
+            found = found.replaced(after)
             write(folder, found)
         if code:
             return code

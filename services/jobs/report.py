@@ -16,6 +16,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from services.jobs import commands
 from services.jobs.machine import processor
 from services.jobs.pictures import Picture, bout_pictures
 from services.jobs.report_page import Extras, report_page
@@ -49,6 +50,7 @@ FILES = {
     "snapshots": "every policy version, named by its hash",
     "learner": "checkpoints, to continue from",
     "config.toml": "the configuration, complete",
+    commands.FILE: "the commands that made it, as they were typed",
     "logs": "what each process logged",
 }
 
@@ -75,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def write_report(folder: Path, *, pictures: bool = True, command: str = "") -> Summary:
+def write_report(folder: Path, *, pictures: bool = True) -> Summary:
     """Write ``report.html`` and ``summary.json`` of a run and return its summary.
 
     A run with rounds of phase two gets ``reproduction.html`` and ``reproduction.json``, too.
@@ -83,7 +85,6 @@ def write_report(folder: Path, *, pictures: bool = True, command: str = "") -> S
     Args:
         folder: of the run.
         pictures: play a bout with the last policies and show moments of it.
-        command: the command line that made the run; by default the one that would make it again.
 
     Raises:
         RiposteError: there is no run, its ledger is damaged, or the files cannot be written.
@@ -91,7 +92,7 @@ def write_report(folder: Path, *, pictures: bool = True, command: str = "") -> S
     state = state_of(folder)
     site = folder / "config.toml"
     settings = Settings.load(site if site.exists() else None)
-    summary = summarise(state, _facts(folder, state, settings, command))
+    summary = summarise(state, _facts(folder, state, settings))
     write_reproduction(folder, summary, settings.to_toml())
     extras = Extras(
         pictures=_pictures(folder, state, settings) if pictures else (),
@@ -146,14 +147,17 @@ def _throughput(
     return stage.stage.agent, minutes, rates
 
 
-def _facts(folder: Path, state: RunState, settings: Settings, command: str) -> Facts:
+def _facts(folder: Path, state: RunState, settings: Settings) -> Facts:
     started = datetime.datetime.fromtimestamp(state.started_at_ns / 1e9, datetime.UTC)
+    origin = _earlier_origin(folder) or _origin(folder, state)
+    if typed := commands.made_by(folder):
+        origin = msgspec.structs.replace(origin, command=typed)
     return Facts(
         folder=str(folder),
         started_at=started.strftime("%Y-%m-%d %H:%M UTC"),
         rules=settings.game,
         control_timestep=settings.sim.control_timestep,
-        origin=_earlier_origin(folder) or _origin(folder, state, command),
+        origin=origin,
     )
 
 
@@ -166,11 +170,11 @@ def _earlier_origin(folder: Path) -> Origin | None:
     return earlier.origin if earlier.finished else None
 
 
-def _origin(folder: Path, state: RunState, command: str) -> Origin:
+def _origin(folder: Path, state: RunState) -> Origin:
     serial = ["--serial"] if state.serial else []
     words = ["riposte", "train", str(folder / "config.toml"), *serial, "--out", "AGAIN"]
     return Origin(
-        command=command or shlex.join(words),
+        command=shlex.join(words),
         commit=commit(),
         packages={name: version for name in PACKAGES if (version := _version(name))},
         python=platform.python_version(),

@@ -67,7 +67,7 @@ def gather(folder: Path, summary: Summary) -> Reproduction:
     tournament = tournament_part(folder, state, missing)
     styles = styles_part(folder, missing)
     exploited = exploitability_part(folder, state, missing)
-    stages = stage_times(folder, summary)
+    stages = stage_times(folder, summary, state)
     found = Reproduction(
         run=summary.run,
         seed=state.seed,
@@ -145,9 +145,11 @@ def _draws(number: int, draws: Sequence[Draw], generator: np.random.Generator) -
     )
 
 
-def stage_times(folder: Path, summary: Summary) -> tuple[Stage, ...]:
+def stage_times(folder: Path, summary: Summary, state: RunState) -> tuple[Stage, ...]:
     """Return how long each stage took, by the ledgers, and by ``pipeline.json`` what came after."""
-    found = [
+    start_ns = state.stages[0].started_at_ns - state.started_at_ns
+    found = [Stage(name="start of the processes", seconds=start_ns / 1e9)]
+    found += [
         Stage(
             name=f"phase one, iteration {number}",
             seconds=sum(s.seconds for s in summary.stages if s.iteration == number),

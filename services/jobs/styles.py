@@ -5,6 +5,7 @@ into the run, and the bundle: the warm start and the selected three, ready to be
 """
 
 import argparse
+import re
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,6 +22,7 @@ from services.jobs.styles_summary import (
     analyse,
     cast_of,
 )
+from services.jobs.tournament_words import aligned
 from services.league.snapshots import SnapshotStore
 from shared.errors import RiposteError
 from shared.policy.snapshot import digest_of, unpack
@@ -99,7 +101,10 @@ def _place(folder: Path) -> str:
 
 
 def trained_by(folder: Path) -> str:
-    """Return the command line that made a run, or one that trains such a run."""
+    """Return the command line that made a run, or one that trains such a run.
+
+    Without the paths of this machine.
+    """
     try:
         known = msgspec.json.decode((folder / "summary.json").read_bytes(), type=dict[str, object])
         command = msgspec.convert(known["origin"], dict[str, object])["command"]
@@ -107,7 +112,9 @@ def trained_by(folder: Path) -> str:
         command = ""
     config = f"{_place(folder)}/config.toml"
     again = ["riposte", "train", config, "--phase", "all", "--out", "AGAIN"]
-    return command if isinstance(command, str) and command else shlex.join(again)
+    if not isinstance(command, str) or not command:
+        return shlex.join(again)
+    return re.sub(r"(?<![^\s=])/[^\s'\"]+", lambda found: _place(Path(found[0])), command)
 
 
 def _bundle(
@@ -178,20 +185,19 @@ def styles_text(summary: StylesSummary, folder: Path) -> str:
 
 def _table(summary: StylesSummary) -> list[str]:
     """Return mean and standard deviation of each feature, a column a protagonist."""
-    width = 16
     chosen = summary.triples[0].policies
     names = [f"{policy.label}{'*' * (policy.label in chosen)}" for policy in summary.policies]
-    lines = [f"{'':<22}" + "".join(f"{name:>{width}}" for name in names)]
+    rows = [("", *names)]
     for k, feature in enumerate(summary.features):
         title = feature.title if feature.unit == "1" else f"{feature.title} ({feature.unit})"
         cells = (
             f"{policy.mean[k]:.3g} {PLUS_MINUS} {policy.spread[k]:.2g}"
             for policy in summary.policies
         )
-        lines.append(f"{title:<22}" + "".join(f"{cell:>{width}}" for cell in cells))
+        rows.append((title, *cells))
     scores = (f"{policy.score:+.0f}" for policy in summary.policies)
-    lines.append(f"{'points against':<22}" + "".join(f"{score:>{width}}" for score in scores))
-    return lines
+    rows.append(("points against", *scores))
+    return aligned(rows)
 
 
 def _accuracy(whom: str, found: SeparabilityNote) -> list[str]:

@@ -37,10 +37,9 @@ from shared.policy.snapshot import Fit
 from shared.runtime.build import commit
 from shared.runtime.files import RunLock, atomic_write, require_free_space
 from shared.runtime.logging import configure_logging
-from shared.runtime.serve import run_id_of, stop_on_signals
+from shared.runtime.serve import stop_on_signals
 from shared.sim.model import FencingModel
 
-BOUTS = 100
 MOST_BOUTS = 100_000
 BATCH = 256
 """Most bouts that an actor plays at once."""
@@ -91,7 +90,7 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
         description="Play every antagonist of a run against every protagonist.",
     )
     parser.add_argument("run", type=Path, metavar="RUN", help="folder of the run")
-    parser.add_argument("--bouts", type=int, metavar="N", help=f"of each pairing ({BOUTS})")
+    parser.add_argument("--bouts", type=int, metavar="N", help="of each pairing (the run's, 100)")
     parser.add_argument("--actors", type=int, metavar="N", help="processes (one per core)")
     parser.add_argument("--seed", type=int, metavar="S", help="of everything random (0)")
     parser.add_argument(
@@ -140,7 +139,8 @@ def _begun(folder: Path) -> RunState | None:
 
 def _begin(found: argparse.Namespace, run: Path, folder: Path) -> RunState:
     """Write snapshots, settings, plan, and last of all the ledger; return its state."""
-    bouts = found.bouts or BOUTS
+    state = state_of(run)
+    bouts = found.bouts or Settings.load(run / "config.toml").train.tournament_bouts
     settings = Settings.load(
         run / "config.toml",
         (
@@ -151,12 +151,12 @@ def _begin(found: argparse.Namespace, run: Path, folder: Path) -> RunState:
     )
     model = FencingModel.build(settings.sim)
     pools = Pools(run, Fit.of(settings.action, model.cfg.control_timestep, model.hash))
-    pools.add_library(state_of(run))
+    pools.add_library(state)
     if found.against == "scripted":
         pools.add_scripted()
     for reference in found.players:
         pools.add(reference)
-    plan = pools.plan(run_id_of(run), bouts, commit())
+    plan = pools.plan(state.run, bouts, commit())
     (folder / "snapshots").mkdir(parents=True, exist_ok=True)
     for digest, payload in pools.payloads.items():
         atomic_write(folder / "snapshots" / f"{digest}.safetensors", payload)

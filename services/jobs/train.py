@@ -8,13 +8,14 @@ import contextlib
 import os
 import sys
 import threading
+import time
 from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import structlog
 
-from services.jobs import pipeline
+from services.jobs import commands, pipeline
 from services.jobs.arguments import (
     check_folder,
     folder_of,
@@ -59,6 +60,7 @@ def main(argv: Sequence[str]) -> int:
         atomic_write(folder / "config.toml", settings.to_toml().encode())
         if found.phase == "all" and not pipeline.is_begun(folder):
             pipeline.write(folder, pipeline.Pipeline())
+        commands.note(folder, ["train", *argv])
         _point_latest_at(folder)
         configure_logging(
             folder / "logs" / "train.jsonl", bound={"service": "train", "run_id": run}
@@ -75,13 +77,16 @@ def main(argv: Sequence[str]) -> int:
             except StopAsked:
                 print(f"\nstopped; continue with: riposte train --resume --out {folder}")
                 return EXIT_INTERRUPTED
+        began = time.monotonic()
         code = _conclude(folder)
+        report_seconds = time.monotonic() - began
         is_whole = found.phase == "all" or (found.phase is None and pipeline.is_begun(folder))
         if code or not is_whole:
             return code
         position = state_of(folder).position
     # Each of these takes the locks it needs.
-    return pipeline.run_jobs(folder, position) or _conclude(folder)
+    code = pipeline.run_jobs(folder, position, report_seconds=report_seconds)
+    return code or _conclude(folder)
 
 
 def _point_latest_at(folder: Path) -> None:

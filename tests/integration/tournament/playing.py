@@ -23,8 +23,9 @@ SMALL = (
     "actor.num_envs=8",
     "actor.rollout_steps=20",
     "sim.target_radius=0.45",
+    "train.tournament_bouts=12",
 )
-WORDS = ("--bouts", "12", "--players", "scripted:static", "scripted:stab")
+WORDS = ("--players", "scripted:static", "scripted:stab")
 """What a small tournament is asked for with."""
 
 

@@ -29,8 +29,12 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def test_what_is_done_is_not_done_again(tmp_path: Path, calls: list[str]) -> None:
-    assert run_jobs(tmp_path, 7, JOBS) == 130
-    assert [(s.name, s.done) for s in read(tmp_path).stages] == [("first", True), ("second", False)]
+    assert run_jobs(tmp_path, 7, JOBS, report_seconds=3.0) == 130
+    stages = read(tmp_path).stages
+    assert [(s.name, s.done) for s in stages] == [
+        ("report", True), ("first", True), ("second", False),
+    ]  # fmt: skip
+    assert stages[0].seconds == 3.0
     assert run_jobs(tmp_path, 7, JOBS) == 0
     assert run_jobs(tmp_path, 7, JOBS) == 0
     assert calls == ["first", "second", "second"]

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from services.jobs import report
+from services.jobs import commands, report
 from services.jobs.pictures import Moment, caption, choose
 from services.jobs.report import write_report
 from services.jobs.summarise import bins
@@ -91,7 +91,8 @@ def test_the_summary_file_is_the_summary(tmp_path: Path) -> None:
 
 
 def test_a_second_report_has_the_same_numbers_and_the_first_ones_origin(tmp_path: Path) -> None:
-    first = write_report(finished_run(tmp_path), pictures=False, command="riposte train --seed 7")
+    commands.note(finished_run(tmp_path), ["train", "--seed", "7"])
+    first = write_report(tmp_path, pictures=False)
     page = (tmp_path / "report.html").read_bytes()
 
     second = write_report(tmp_path, pictures=False)

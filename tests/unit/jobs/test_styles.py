@@ -102,6 +102,9 @@ def test_the_command_that_made_the_run_is_kept(tmp_path: Path):
     made = {"origin": {"command": "riposte train --phase all --rounds 6"}}
     (tmp_path / "summary.json").write_text(json.dumps(made))
     assert trained_by(tmp_path) == "riposte train --phase all --rounds 6"
+    made["origin"]["command"] = f"riposte train {tmp_path}/a.toml --phase all --out={tmp_path} && x"
+    (tmp_path / "summary.json").write_text(json.dumps(made))
+    assert trained_by(tmp_path) == f"riposte train a.toml --phase all --out={tmp_path.name} && x"
     (tmp_path / "summary.json").write_text("{}")
     again = f"riposte train {tmp_path.name}/config.toml --phase all --out AGAIN"
     assert trained_by(tmp_path) == again
@@ -139,6 +142,20 @@ def test_the_screen_names_the_selected_and_where_the_rest_is(run: Path, summary:
     assert "told apart of three: 100.0%" in said
     assert f"{summary.effective_styles.value:.2f} [" in said
     assert str(run / "bundle") in said
+
+
+def test_columns_stay_apart_whoever_is_measured(summary: StylesSummary, tmp_path: Path):
+    longer = [
+        msgspec.structs.replace(policy, label=f"{policy.label} heuristic-retreating")
+        for policy in summary.policies
+    ]
+    wide = msgspec.structs.replace(summary, policies=tuple(longer))
+    lines = styles_text(wide, tmp_path).splitlines()
+    table = lines[1 : 1 + 1 + len(FEATURES) + 1]
+    assert {len(re.split(r"\s{2,}", line.strip())) for line in table[1:]} == {1 + len(longer)}
+    assert len({len(line) for line in table}) == 1
+    for policy in longer:
+        assert policy.label in re.split(r"\s{2,}", table[0].replace("*", ""))
 
 
 def test_styles_that_differ_in_more_than_three_ways_are_said_to(tmp_path: Path):
