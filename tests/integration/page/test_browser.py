@@ -126,10 +126,12 @@ def test_the_target_scores_and_sounds_and_touching_bats_costs_ten_points(
 
     enter()
     player.until(lambda: (enter(), site.referee[-1].score > 0)[1])
-    heard = player.until(lambda: (s := player.read("sound()"))["level"] > 0.05 and s)
-    assert heard["hz"] == pytest.approx(heard["asked"], abs=8.0)
-    assert heard["asked"] in (440, 300)
 
+    def heard() -> bool:  # measured at the output
+        sound = player.read("sound()")
+        return sound["level"] > 0.05 and abs(sound["hz"] - 440.0) < 8.0
+
+    player.until(lambda: (enter(), heard())[1])
     player.until(lambda: (strike(player), site.referee[-1].penalty_steps > 2)[1])
     said = [state for state in site.referee if state.phase == "running"]
     for state in said:
@@ -182,6 +184,16 @@ def test_a_second_page_takes_the_bat_and_the_first_is_told(
     player.page.click("#overlay-button")
     player.until(lambda: not player.page.is_visible("#overlay"))
     player.point(0.4, 0.35, 1.3)
+    player.until(lambda: site.bats[-1].is_valid[0])
+
+
+def test_a_hidden_page_has_lost_the_bat_at_once_and_finds_it_again(site: LiveSite, player: Player):
+    hide = "Object.defineProperty(document, 'hidden', {value: %s, configurable: true});"
+    tell = "document.dispatchEvent(new Event('visibilitychange'))"
+    player.page.evaluate(hide % "true" + tell)
+    player.until(lambda: not site.bats[-1].is_valid[0])
+    player.until(lambda: player.read("frame().is_lost"))
+    player.page.evaluate(hide % "false" + tell)
     player.until(lambda: site.bats[-1].is_valid[0])
 
 
