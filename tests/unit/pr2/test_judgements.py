@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from services.robot_io.config import RobotIoConfig
 from services.robot_io.pr2.config import Pr2Config
 from services.robot_io.pr2.controllers import acts_on, controller_problems
 from services.robot_io.pr2.offset import ClockOffset
@@ -236,3 +237,10 @@ def test_settings_that_cannot_be_are_one_line(setting: str, said: str) -> None:
     with pytest.raises(ConfigError, match=said) as found:
         load_section(None, "pr2", Pr2Config, (setting,))
     assert "\n" not in str(found.value)
+
+
+def test_against_a_pr2_plays_a_person() -> None:
+    with pytest.raises(ConfigError, match="tracker may be 'vive', 'mouse' or 'replay'"):
+        load_section(None, "robot_io", RobotIoConfig, ("robot_io.link=pr2",))
+    asked = ("robot_io.link=pr2", "robot_io.tracker=vive")
+    assert load_section(None, "robot_io", RobotIoConfig, asked).link == "pr2"
