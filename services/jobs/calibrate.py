@@ -44,6 +44,11 @@ PROTAGONIST = 1
 SEED = 0
 """Draws subsets of the poses: the same poses give the same calibration."""
 
+LOST: dict[Which, str] = {
+    "tracker": "is lost: turn it towards a base station",
+    "tool": "is not known: does its controller run? riposte robot check tells",
+}
+
 Say = Callable[[str], None]
 
 
@@ -55,7 +60,7 @@ class Listener:
         self._bats = bus.subscribe(BATS)
         self._clock = clock
         self._heard_at = dict.fromkeys(needed, clock.now())
-        self._is_lost = False
+        self._is_lost: dict[Which, bool] = dict.fromkeys(needed, False)
         self.say = say
         self.progress_at = clock.now()
         """When the person got on; whoever listens moves it."""
@@ -72,12 +77,14 @@ class Listener:
         for _ in range(TAKE_MOST):
             if (raw := self._raws.take()) is None:
                 break
-            self._note(raw.serial, raw.is_valid)
+            self.serial = raw.serial
+            self._note("tracker", raw.is_valid)
             heard.append(("tracker", raw.pose if raw.is_valid else None))
         for _ in range(TAKE_MOST):
             if (states := self._bats.take()) is None:
                 break
             is_there = bool(states.is_valid[PROTAGONIST])
+            self._note("tool", is_there)
             heard.append(("tool", states.tools[PROTAGONIST] if is_there else None))
         for which, at in self._heard_at.items():
             if any(what == which for what, _ in heard):
@@ -96,12 +103,12 @@ class Listener:
         self._raws.close()
         self._bats.close()
 
-    def _note(self, serial: str, is_valid: bool) -> None:
-        self.serial = serial
-        if self._is_lost == is_valid:
-            self._is_lost = not is_valid
-            where = "is lost: turn it towards a base station" if self._is_lost else "is seen again"
-            self.say(f"the tracker {serial} {where}")
+    def _note(self, which: Which, is_valid: bool) -> None:
+        if self._is_lost.get(which, is_valid) != is_valid:
+            return
+        self._is_lost[which] = not is_valid
+        what = f"tracker {self.serial}" if which == "tracker" else "robot's tool"
+        self.say(f"the {what} is seen again" if is_valid else f"the {what} {LOST[which]}")
 
 
 class Gathering:

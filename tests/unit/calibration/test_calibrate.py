@@ -114,6 +114,9 @@ def test_a_tracker_that_is_lost_is_told_and_its_pose_not_taken():
     assert robot_io.said[3:] == ["this pose is taken already: move on and turn the gripper"]
     robot_io.hold(gathering, pose, None, 1.0)  # no robot, no pair
     assert len(gathering.collector.pairs) == 1
+    assert robot_io.said[4:] == [
+        "the robot's tool is not known: does its controller run? riposte robot check tells"
+    ]
 
 
 def test_a_robot_io_that_is_silent_or_a_person_who_left_end_it():
