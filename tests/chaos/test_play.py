@@ -1,5 +1,6 @@
 """kill -9 of what a moving robot depends on: it stops, that is said, and nobody moves it again."""
 
+import signal
 from pathlib import Path
 
 import pytest
@@ -33,10 +34,13 @@ def test_the_robot_stops_and_moves_again_only_when_it_is_armed(
         onlooker.until(lambda: f"robot {onlooker.mode}" in match.said)
         assert "until somebody arms it: riposte robot arm" in match.said or victim == "robot-io-0"
 
-        begin = len(onlooker.states)
-        onlooker.rest(6.0)  # everybody is back, policies answer, and nothing moves
-        assert len(onlooker.states) > begin + 100
-        assert onlooker.travel(begin + 50) < 0.002
+        begin, shut = len(onlooker.states), len(onlooker.gates)
+        onlooker.rest(6.0)  # everybody is back, policies answer, and nothing is commanded
+        assert len(onlooker.states) > begin + 200
+        assert len(onlooker.gates) > shut + 100
+        assert not any(gate.is_sent for gate in onlooker.gates[shut:])
+        # The other simulated robot, which no gate guards, may still lean on its bat.
+        assert onlooker.travel(begin + 100) < 0.01
         assert onlooker.mode in STOPPED
         assert {state.bout for state in onlooker.referee} <= bouts | {""}
         assert (onlooker.states[-1].boot == boot) == (victim != "robot-io-0")
@@ -48,4 +52,7 @@ def test_the_robot_stops_and_moves_again_only_when_it_is_armed(
         assert cli.main(["robot", "check", "--run", str(folder)]) == 0, capsys.readouterr().out
         assert cli.main(["robot", "arm", "--run", str(folder)]) == 0
         onlooker.until(lambda: onlooker.is_fencing() and onlooker.referee[-1].bout not in bouts)
+        match.process.send_signal(signal.SIGINT)
+        match.finish()
     assert processes_of(folder) == []
+    assert [line.split()[0] for line in match.summary["deaths"]] == [victim]

@@ -1,0 +1,37 @@
+"""What the control benchmark makes of what it saw."""
+
+import numpy as np
+import pytest
+
+from benchmarks.control import measurement
+from shared.messages.play import GateState
+
+
+def gate(tick: int, answer_ms: float | None, lateness_ms: float = 0.1) -> GateState:
+    return GateState(
+        tick=tick, mode="armed", commanded=np.zeros(7), is_clipped=False,
+        lateness_ms=lateness_ms, answer_ms=answer_ms, late_ticks=0,
+    )  # fmt: skip
+
+
+def test_late_and_lost_ticks_count_alike_and_misses_are_shown():
+    gates = [gate(tick, 2.0 if tick % 10 else None) for tick in range(90)]
+    counts = {"ticks": 95, "ticks_late": 2, "ticks_lost": 3, "commands_repeated": 9}
+    seen = {
+        "gates": gates, "counts": counts, "trips": 1, "bouts": 4, "updates": 7, "bytes": 500,
+        "bare": {"times_ms": [0.5] * 99 + [1.5], "missed": 2},
+    }  # fmt: skip
+    found = measurement(seen)
+    assert found.value == pytest.approx(2.0)
+    assert found.limit == pytest.approx(0.5)
+    assert found.ratio.value == pytest.approx(5 / 98)
+    assert not found.ratio.is_met
+    figures = {check.name: check.value for check in found.checks}
+    assert figures["ticks"] == 98
+    assert figures["ticks over 10 ms late"] == 2
+    assert figures["ticks lost"] == 3
+    assert figures["ticks without an answer in time"] == 9
+    assert figures["ticks not heard here"] == 5
+    assert figures["bare round trips missed"] == 2
+    assert figures["trips of the gate"] == 1
+    assert found.runs[0]["ratio"] == 0.0
