@@ -9,7 +9,8 @@ RUNNING: Final = "running"
 def acts_on(name: str, parameters: Any, joints: Sequence[str]) -> bool:
     """Return whether a controller puts efforts on the arm.
 
-    One of which nothing is known is taken to, where its name says that it is of this side.
+    One of which nothing is known is taken to, where its name says that it is of this side and
+    not of its gripper.
 
     Args:
         name: of the controller.
@@ -17,8 +18,9 @@ def acts_on(name: str, parameters: Any, joints: Sequence[str]) -> bool:
         joints: of the arm.
     """
     side = joints[0].split("_", 1)[0] + "_"
+    by_name = name.startswith(side) and not name.startswith(f"{side}gripper")
     if not isinstance(parameters, Mapping):
-        return name.startswith(side)
+        return by_name
     found: Mapping[str, Any] = parameters  # pyright: ignore[reportUnknownVariableType]
     named = {str(found.get("joint", ""))}
     listed = found.get("joints", ())
@@ -27,7 +29,7 @@ def acts_on(name: str, parameters: Any, joints: Sequence[str]) -> bool:
     if named != {""}:
         return bool(named & set(joints))
     ends = str(found.get("tip_name", found.get("tip_link", "")))
-    return ends.startswith(side) if ends else name.startswith(side)
+    return ends.startswith(side) if ends else by_name
 
 
 def _joint_name(one: Any) -> str:

@@ -87,6 +87,8 @@ def test_a_controller_without_parameters_is_said_once() -> None:
         ("r_cart_2", {"tip_name": "r_gripper_tool_frame"}, True),
         ("l_cart", {"tip_name": "l_gripper_tool_frame"}, False),
         ("r_mystery", None, True),
+        ("r_gripper_sensor_controller", {"gain": 1.0}, False),
+        ("r_gripper_mystery", {"tip_name": "r_gripper_tool_frame"}, True),
         ("r_mystery", {"gain": 1.0}, True),
         ("head_traj_controller", None, False),
         ("mine", {"joints": 7}, False),
