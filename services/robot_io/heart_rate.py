@@ -12,6 +12,7 @@ import structlog
 
 from shared.bus.base import Bus
 from shared.clock import Clock
+from shared.errors import ConfigError
 from shared.messages.play import HeartRate
 from shared.messages.topics import HEART_RATE
 
@@ -194,12 +195,17 @@ def open_heart_rate(cfg: HeartRateConfig, bus: Bus, clock: Clock) -> HeartRateFe
     """Return what the settings ask for; None for no heart rate.
 
     Raises:
-        ConfigError: a recording cannot be read.
+        ConfigError: a recording cannot be read, or bleak is not installed.
     """
     source: HeartRateSource
     if cfg.source == "ble":
-        from services.robot_io.heart_rate_ble import BleStrap  # bleak only where it is asked for
-
+        try:  # bleak only where it is asked for
+            from services.robot_io.heart_rate_ble import BleStrap
+        except ImportError as error:
+            raise ConfigError(
+                f"heart_rate.source is 'ble', which needs bleak ({error}): "
+                "`pip install riposte[robot]`, or set it to 'none'"
+            ) from error
         source = BleStrap(cfg, clock)
     elif cfg.source == "replay":
         from services.robot_io.heart_rate_replay import HeartRateReplay

@@ -138,6 +138,7 @@ def test_a_tone_ends_when_the_referee_dies(devices: Devices):
     assert not np.abs(devices.sound.samples()[-RATE // 10 :]).any()
 
 
+@pytest.mark.slow
 def test_a_sound_server_that_dies_is_noticed_and_its_return_too(devices: Devices):
     it = devices.room
     streams = it.fresh_status().counters["tone_streams"]
@@ -150,6 +151,7 @@ def test_a_sound_server_that_dies_is_noticed_and_its_return_too(devices: Devices
     it.until(lambda: abs(devices.hear(440.0).pitch() - 440.0) < 3.0)
 
 
+@pytest.mark.slow
 def test_a_sound_process_that_dies_is_started_again(devices: Devices):
     it = devices.room
     before = it.fresh_status().counters

@@ -1,6 +1,7 @@
 """The feed: what is published, gaps, and recordings; its settings."""
 
 import re
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -205,6 +206,14 @@ def test_arrays_that_are_no_recording_are_refused(tmp_path: Path):
 def test_no_heart_rate_is_the_default():
     clock = ManualClock()
     assert open_heart_rate(HeartRateConfig(), MemoryHub(clock).join("x"), clock) is None
+
+
+def test_a_strap_without_its_library_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.delitem(sys.modules, "services.robot_io.heart_rate_ble", raising=False)
+    monkeypatch.setitem(sys.modules, "bleak", None)
+    clock = ManualClock()
+    with pytest.raises(ConfigError, match=r"needs bleak .*: `pip install riposte\[robot\]`"):
+        open_heart_rate(HeartRateConfig(source="ble"), MemoryHub(clock).join("x"), clock)
 
 
 @pytest.mark.parametrize(
