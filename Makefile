@@ -13,7 +13,7 @@ export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help train test check format test-all slow chaos bench docs clean
+.PHONY: help train play test check format test-all slow chaos bench docs clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -32,6 +32,9 @@ $(STAMP): pyproject.toml constraints.txt
 
 train: $(STAMP) ## train two fencers on this machine and write a report
 	@$(BIN)/riposte train $(ARGS)
+
+play: $(STAMP) ## fence against the robot in a browser; ARGS='--antagonist heuristic' needs none
+	@$(BIN)/riposte play $(ARGS)
 
 test: $(STAMP) ## unit, property, integration and replay tests
 	@$(BIN)/pytest -q -m "not slow and not chaos and not hardware and not gpu and not bench" \

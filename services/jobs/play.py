@@ -1,8 +1,8 @@
 """`riposte play`: fence against the robot on a page, or let two policies play, on this machine.
 
-Starts router, recorder, robot_io, policies, referee and the page, arms the simulated robot once,
-shows how it goes, and ends with the scores. A real robot is armed on the page or with
-`riposte robot arm`, never by this command.
+Starts router, recorder, robot_io, policies, referee and the page, shows how it goes, and ends with
+the scores. Where two policies play, typing the command arms the simulated robot, once; else a
+person does so on the page or with `riposte robot arm`, and a real robot is never armed otherwise.
 """
 
 import contextlib

@@ -72,8 +72,8 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def is_armed_by_typing(self) -> bool:
-        """Return whether typing the command is the act that arms: only of a simulated robot."""
-        return self.link == "twin"
+        """Return whether typing the command arms: a simulated robot, where no page does it."""
+        return self.link == "twin" and self.starts_bouts
 
     @property
     def has_page(self) -> bool:

@@ -151,6 +151,6 @@ class Onlooker:
 def onlooking(match: Playing) -> Iterator[Onlooker]:
     match.until(match.is_endpoint_there)
     place = read_endpoint(match.folder)
-    cfg = BusConfig(connect=(place.connect,), open_seconds=30.0)
+    cfg = BusConfig(connect=(place.connect,), open_seconds=60.0)
     with contextlib.closing(open_zenoh(cfg, "onlooker", SystemClock(), place.run)) as bus:
         yield Onlooker(match, bus)

@@ -7,13 +7,15 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from services import cli
 from services.jobs import play_plan, play_seats
 from services.jobs.play_plan import LAPTOP, parse, plan_of
+from services.jobs.site import section_types
 from services.robot_io.config import RobotIoConfig, SafetyConfig
-from shared.config.site import load_section
+from shared.config.site import load_section, load_site
 from shared.errors import SnapshotError
 from shared.runtime.logging import configure_logging
 from shared.styles.bundle import load_bundle, shipped_bundle
@@ -22,7 +24,7 @@ from tests.unit.policy.making import snapshot
 OURS = snapshot(1, agent="protagonist", policy_version=3)
 NEWER = snapshot(2, agent="protagonist", policy_version=9)
 THEIRS = snapshot(3, agent="antagonist", policy_version=4)
-PLAY_TOML = Path(__file__).resolve().parents[3] / "deploy" / "play.toml"
+DEPLOY = Path(__file__).resolve().parents[3] / "deploy"
 
 
 @pytest.fixture(autouse=True)
@@ -64,7 +66,7 @@ def test_without_arguments_a_person_with_a_mouse_meets_the_first_selected_style(
     assert (plan.antagonist.label, plan.antagonist.reference) == ("mouse", "person")
     assert (plan.protagonist.label, plan.protagonist.reference) == (style.name, style.reference)
     assert plan.has_page
-    assert plan.is_armed_by_typing
+    assert not plan.is_armed_by_typing
     assert not plan.starts_bouts
     assert plan.bouts == 0
     assert settings["robot_io"]["tracker"] == "mouse"
@@ -83,6 +85,7 @@ def test_two_policies_need_no_page_and_start_by_themselves():
     assert plan.protagonist.reference == "scripted:heuristic"
     assert not plan.has_page
     assert plan.starts_bouts
+    assert plan.is_armed_by_typing
     assert settings["robot_io"]["tracker"] == "policy"
     assert settings["policy"]["antagonist"] == "scripted:stab"
 
@@ -158,7 +161,7 @@ def test_the_default_page_port_gives_way(monkeypatch: pytest.MonkeyPatch):
 
 def test_the_laptops_site_file_says_what_no_site_file_means():
     _, without = planned()
-    _, with_file = planned(str(PLAY_TOML))
+    _, with_file = planned(str(DEPLOY / "play.toml"))
     for section in ("robot_io", "safety", "sim", "game", "action"):
         assert with_file[section] == without[section]
     assert without["robot_io"]["twin_filter"] == 1.0
@@ -174,6 +177,18 @@ def test_the_laptops_limits_are_never_those_of_a_real_robot(capsys: pytest.Captu
                 assert getattr(laptop, key) != getattr(default, key)
     line = refused(capsys, "--set", 'robot_io.link="pr2"', "--antagonist", "vive")
     assert "a real robot: its limits stand in a site file" in line
+
+
+def test_the_site_file_of_a_real_robot_is_played_with_the_default_limits():
+    plan, settings = planned(str(DEPLOY / "robot.toml"))
+    assert (plan.link, plan.antagonist.label) == ("pr2", "vive")
+    assert not plan.is_armed_by_typing
+    assert not plan.starts_bouts
+    assert planned(str(DEPLOY / "robot.toml"), "--bouts", "20")[0].starts_bouts
+    limits = msgspec.convert(settings["safety"], SafetyConfig)
+    assert limits == SafetyConfig()
+    for name in ("play.toml", "robot.toml"):
+        assert load_site(DEPLOY / name, section_types())
 
 
 # -- refusals ---------------------------------------------------------------------------------
