@@ -71,6 +71,7 @@ class Web:
         self._assets = dict(assets)
         self._lock = threading.Lock()
         self._session: _Session | None = None
+        self._connections: set[ServerConnection] = set()
         self._pointer: Pointer | None = None
         self._asks: deque[tuple[int, Ask]] = deque()
         self._counters = {
@@ -141,8 +142,9 @@ class Web:
         """Send the page away and stop serving; a second time does nothing."""
         if self._loop.is_closed():
             return
-        with contextlib.suppress(TimeoutError):
-            self._call(self._end(), CLOSE_SECONDS)
+        for work in (self._end(), self._cancel()):
+            with contextlib.suppress(TimeoutError):
+                self._call(work, CLOSE_SECONDS)
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(CLOSE_SECONDS)
         if not self._thread.is_alive():
@@ -160,14 +162,23 @@ class Web:
         quiet.addHandler(logging.NullHandler())
         return await serve(
             self._play, sock=listener, process_request=self._receive, max_size=MAX_BYTES,
-            max_queue=8, write_limit=16384, compression=None, open_timeout=5.0,
-            ping_interval=5.0, ping_timeout=5.0, close_timeout=1.0, server_header=None,
+            max_queue=8, write_limit=16384, compression=None, open_timeout=30.0,
+            ping_interval=5.0, ping_timeout=10.0, close_timeout=20.0, server_header=None,
             logger=quiet,
         )  # fmt: skip
 
     async def _end(self) -> None:
         self._server.close()
         await self._server.wait_closed()
+
+    async def _cancel(self) -> None:
+        """End what waits for a browser that does not answer."""
+        for connection in self._connections:
+            connection.transport.abort()
+        tasks = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
 
     def _receive(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request for a file; let one for the socket through."""
@@ -206,10 +217,11 @@ class Web:
             session = self._session = _Session(self._counters["pages"], connection)
             self._pointer = None
             self._asks.clear()
-        if before is not None:
+        if before is not None and not before.ending.done():
             self._count("pages_replaced")
             before.ending.set_result((TAKEN_OVER, "another page plays now"))
         log.info("page_opened", page=session.number)
+        self._connections.add(connection)
         sender = asyncio.create_task(self._send(session))
         closer = asyncio.create_task(self._end_when_told(session))
         try:
@@ -224,6 +236,7 @@ class Web:
         finally:
             for task in (sender, closer):
                 task.cancel()
+            self._connections.discard(connection)
             if self._session is session:
                 self._session = None
             log.info("page_closed", page=session.number)
