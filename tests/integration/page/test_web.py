@@ -191,19 +191,19 @@ def test_a_second_page_takes_over_and_the_first_is_told(web: Web):
 
 
 def test_a_browser_that_does_not_read_drops_frames_and_holds_nobody_up(web: Web):
-    frame = json.dumps({"type": "frame", "fill": "x" * 2000}).encode()
+    frame = json.dumps({"type": "frame", "fill": "x" * 16000}).encode()
     with opened(web, max_queue=1) as page:
         page.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         until(lambda: web.session == 1)
         took: list[float] = []
-        for _ in range(2000):
+        for _ in range(1000):
             before = time.monotonic()
             web.show(frame)
             took.append(time.monotonic() - before)
             time.sleep(0.0002)
         until(lambda: web.counters["frames_dropped"] > 100)
         counters = web.counters
-        assert counters["frames_sent"] + counters["frames_dropped"] <= 2000
+        assert counters["frames_sent"] + counters["frames_dropped"] <= 1000
         assert sorted(took)[len(took) // 2] < 0.001
         for _ in range(100):
             web.tell(b"{}")
