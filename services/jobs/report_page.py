@@ -153,15 +153,14 @@ def _heat_table(meetings: Sequence[Meeting], words: str) -> Html:
     by_names = {(m.antagonist, m.protagonist): m for m in meetings}
     scores = [abs(m.score.mean) for m in meetings if m.score is not None]
     most = max(scores, default=1.0) or 1.0
-    head = tag("tr", tag("th"), [tag("th", f"v {name}") for name in protagonists])
-    rows: list[Html] = []
-    for antagonist in antagonists:
-        cells = [_cell(by_names.get((antagonist, name)), most) for name in protagonists]
-        rows.append(tag("tr", tag("th", _agent("antagonist", antagonist)), cells))
-    table = tag(
-        "table", tag("caption", words), tag("thead", head), tag("tbody", rows), class_="heat"
-    )
-    return tag("div", table, class_="wide")
+    rows = [
+        (
+            _agent("antagonist", antagonist),
+            [_cell(by_names.get((antagonist, name)), most) for name in protagonists],
+        )
+        for antagonist in antagonists
+    ]
+    return html.matrix(words, [f"v {name}" for name in protagonists], rows)
 
 
 def _cell(meeting: Meeting | None, most: float) -> Html:

@@ -195,28 +195,25 @@ def _tournament(tournament: Tournament | None) -> Node:
             "given and taken came from camping. ",
             _more("tournament/tournament.html"),
         ),
-        _heat(tournament, words),
+        heat(tournament, words),
         tag("h3", "Against scripted and simulated people"),
         _held(tournament),
         html.details("Ratings", _ratings(tournament)),
     ]
 
 
-def _heat(tournament: Tournament, words: str) -> Html:
+def heat(tournament: Tournament, words: str) -> Html:
+    """Return the payoff as a matrix."""
     cells = {(cell.antagonist, cell.protagonist): cell for cell in tournament.cells}
     most = max((abs(cell.score.mean) for cell in tournament.cells), default=1.0) or 1.0
-    head = tag("tr", tag("th"), [tag("th", f"v {name}") for name in tournament.protagonists])
     rows = [
-        tag(
-            "tr",
-            tag("th", tag("span", one, class_="antagonist")),
+        (
+            tag("span", one, class_="antagonist"),
             [_cell(cells.get((one, two)), most) for two in tournament.protagonists],
         )
         for one in tournament.antagonists
     ]
-    caption = tag("caption", words)
-    table = tag("table", caption, tag("thead", head), tag("tbody", rows), class_="heat")
-    return tag("div", table, class_="wide")
+    return html.matrix(words, [f"v {name}" for name in tournament.protagonists], rows)
 
 
 def _cell(cell: Cell | None, most: float) -> Html:
@@ -230,6 +227,7 @@ def _cell(cell: Cell | None, most: float) -> Html:
         tag("br"),
         tag("span", f"camping {percent_text(cell.camping_share)}", class_="soft"),
         style=f"background: rgba({HEAT[cell.score.mean >= 0]}, {strength:.2f})",
+        title=f"{cell.antagonist} v {cell.protagonist}: {span_text(cell.score)}",
     )
 
 

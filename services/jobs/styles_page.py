@@ -282,20 +282,16 @@ def _separability(summary: StylesSummary) -> Node:
 
 
 def _confusion(found: SeparabilityNote, accuracy: AccuracyNote, title: str) -> Html:
-    rows: list[Html] = []
+    rows: list[tuple[str, list[Html]]] = []
     for label, counts in zip(found.policies, accuracy.confusion, strict=True):
         total = sum(counts)
         cells = [
             tag("td", f"{count / total:.1%}", style=f"background: {_shade(count / total)}")
             for count in counts
         ]
-        rows.append(tag("tr", tag("th", label), cells))
-    head = tag("tr", tag("th"), [tag("th", f"taken for {name}") for name in found.policies])
+        rows.append((label, cells))
     words = f"{title}: share of each policy's bouts (row) taken for each policy's."
-    table = tag(
-        "table", tag("caption", words), tag("thead", head), tag("tbody", rows), class_="heat"
-    )
-    return tag("div", table, class_="wide")
+    return html.matrix(words, [f"taken for {name}" for name in found.policies], rows)
 
 
 def _diversity(summary: StylesSummary) -> Node:

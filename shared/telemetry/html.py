@@ -62,6 +62,17 @@ table.heat td { border: 0; border-radius: 8px; padding: 10px 14px; text-align: c
   min-width: 128px; }
 table.heat td b { font-size: 1.1rem; display: block; }
 table.heat th { border: 0; padding: 6px 10px; vertical-align: middle; }
+table.many { width: 100%; table-layout: fixed; border-spacing: 2px; }
+table.many td { min-width: 0; padding: 4px 1px; border-radius: 5px; font-size: .68rem;
+  line-height: 1.25; }
+table.many td b { font-size: .8rem; } table.many .soft { font-size: .62rem; }
+table.many th:first-child { width: 15%; overflow-wrap: anywhere; }
+table.many th { padding: 4px 2px; font-size: .74rem; }
+table.many thead th { vertical-align: bottom; text-align: center; }
+table.many thead span { writing-mode: vertical-rl; transform: rotate(180deg); }
+table.crowd td .soft, table.crowd td br { display: none; }
+table.crowd th { padding: 4px 0; } table.crowd td { padding: 4px 0; }
+table.crowd td b { font-size: .52rem; font-weight: 600; }
 code, pre { font: .85rem/1.5 ui-monospace, "SF Mono", Menlo, "DejaVu Sans Mono", monospace; }
 pre { background: var(--card); border: 1px solid var(--line); border-radius: 8px;
   padding: 12px 14px; overflow-x: auto; }
@@ -69,6 +80,8 @@ details { margin: .8em 0; } summary { cursor: pointer; font-weight: 600; }
 footer { margin-top: 4em; color: var(--soft); font-size: .84rem; }
 @media print { main { padding: 0; max-width: none; } details { display: block; } }
 """
+MANY, CROWD = 6, 14
+"""Columns of a matrix above which its cells are small, and above which they hold one number."""
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 
@@ -127,6 +140,27 @@ def table(
     body = [tag("tr", [cell("td", k, child) for k, child in enumerate(row)]) for row in rows]
     below = tag("caption", caption) if caption is not None else None
     inner = tag("table", below, tag("thead", head), tag("tbody", body))
+    return tag("div", inner, class_="wide")
+
+
+def matrix(
+    caption: Node, columns: Sequence[str], rows: Iterable[tuple[Node, Sequence[Node]]]
+) -> Html:
+    """Return coloured cells that fit the page: many are small, under names set upright.
+
+    Args:
+        caption: what the cells say.
+        columns: their names.
+        rows: name and ``td`` elements of each; what is of class ``soft`` in a cell is left out
+            where columns are a crowd.
+    """
+    count = len(columns)
+    size = "heat many crowd" if count > CROWD else "heat many" if count > MANY else "heat"
+    head = tag("tr", tag("th"), [tag("th", tag("span", name)) for name in columns])
+    body = [tag("tr", tag("th", name), list(cells)) for name, cells in rows]
+    inner = tag(
+        "table", tag("caption", caption), tag("thead", head), tag("tbody", body), class_=size
+    )
     return tag("div", inner, class_="wide")
 
 

@@ -12,7 +12,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from services.jobs.report import write_report
+from services.jobs.reproduction_page import heat
+from services.jobs.reproduction_parts import Cell, Score, Tournament
 from shared.clock import SystemClock
+from shared.telemetry import html
 from tests.integration.telemetry.browser import Browser, find_chromium
 from tests.unit.jobs.ledgers import finished_run
 
@@ -57,6 +60,38 @@ def test_the_report_is_complete_and_asks_for_nothing(tmp_path: Path, browser: Br
     assert all(url.startswith(("file:", "data:")) for url in requests)
     errors = [event for event in browser.events if event["method"] == "Log.entryAdded"]
     assert errors == []
+
+
+@pytest.mark.parametrize("columns", [3, 7, 12, 20])
+def test_a_matrix_fits_the_page_however_many_play(
+    tmp_path: Path, browser: Browser, columns: int
+) -> None:
+    names = ["protagonist warm start", "heuristic-retreating", *map(str, range(columns - 2))]
+    score = Score(mean=-12_345.0, low=-13_456.0, high=-11_234.0, count=100)
+    cells = [
+        Cell(antagonist=one, protagonist=two, bouts=100, score=score, camping_share=0.4)
+        for one in ("antagonist warm start", "person-adaptive", "antagonist round 6")
+        for two in names
+    ]
+    tournament = Tournament(
+        bouts=1, least_bouts=1, antagonists=tuple(dict.fromkeys(c.antagonist for c in cells)),
+        protagonists=tuple(names), cells=tuple(cells), camping_share=0.0, ratings=(), scripted=(),
+        held=(), baselines=(),
+    )  # fmt: skip
+    page = tmp_path / "page.html"
+    page.write_text(html.page("t", heat(tournament, "words")), encoding="utf-8")
+    browser.open(page.as_uri())
+    assert browser.wait_until(
+        lambda: browser.evaluate("document.readyState") == "complete", timeout=30.0
+    )
+    width, room = browser.evaluate(
+        "(w => [w.scrollWidth, w.clientWidth])(document.querySelector('.wide'))"
+    )
+    assert 0 < width <= room
+    cut = "[...document.querySelectorAll('td, th')].filter(c => c.scrollWidth > c.clientWidth + 1)"
+    assert browser.evaluate(f"{cut}.map(c => c.textContent)") == []
+    browser.screenshot(tmp_path / "page.png", full_page=True)
+    assert (tmp_path / "page.png").stat().st_size > 0
 
 
 def test_the_report_follows_a_dark_scheme(tmp_path: Path, browser: Browser) -> None:
