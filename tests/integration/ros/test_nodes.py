@@ -68,14 +68,13 @@ def test_a_subscriber_that_does_not_read_holds_up_neither_publisher_nor_others(
         stuck.sendall(header({"callerid": "/stuck", "topic": "/t", "type": TEXT, "md5sum": "*"}))
         eventually(lambda: len(writer.subscribers) == 2)
         slowest, message = 0.0, text("x" * 10_000)
-        for _ in range(600):
+        for count in range(600):
             began = time.perf_counter()
             writer.publish(message)
             slowest = max(slowest, time.perf_counter() - began)
-            time.sleep(0.0005)
-        eventually(lambda: reader.received >= 590)
+            eventually(lambda least=count + 1: reader.received >= least)
         assert writer.dropped > 100
-    assert slowest < 0.05
+    assert slowest < 2.0  # one that waited would have waited until the stuck one was given up
     eventually(lambda: writer.subscribers == ("/reader",))
 
 
