@@ -1,8 +1,5 @@
 """A PR2 with its gate, and whoever plays against it."""
 
-import sys
-from typing import Final
-
 from services.robot_io.config import RobotIoConfig, SafetyConfig
 from services.robot_io.gate import Gate
 from services.robot_io.poses import pose_of
@@ -19,9 +16,6 @@ from shared.sim.config import SimConfig
 from shared.sim.model import FencingModel
 from shared.sim.twin import Twin, command_of
 
-SWITCH_SECONDS: Final = 0.0005
-"""A thread that reads a long message lets the loop go on after so long; Python's own is 5 ms."""
-
 
 def pr2_parts(
     cfg: RobotIoConfig, pr2: Pr2Config, safety: SafetyConfig, sim: SimConfig, bus: Bus,
@@ -33,7 +27,6 @@ def pr2_parts(
         ConfigError: a tracker cannot be opened.
         RosError: the master's address or this machine's cannot be.
     """
-    sys.setswitchinterval(SWITCH_SECONDS)
     model = FencingModel.build(sim)
     arm = load_arm(sim.arms[PROTAGONIST])
     w, x, y, z = (float(number) for number in bat_quaternion(model.parameters.bat))
