@@ -5,6 +5,7 @@ PYTHON ?= python3
 RUN ?= runs/latest
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+PLAY_STAMP := $(VENV)/.installed-play
 TEST_FLAGS ?=
 
 # One thread for each library in each process: spinning thread pools slow two cores down.
@@ -19,21 +20,28 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1|\2/' | column -t -s '|'
 
-$(STAMP): pyproject.toml constraints.txt
+$(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "riposte needs Python 3.11 or newer; found $$($(PYTHON) --version): make PYTHON=python3.11 ..."; exit 2; }
-	@test -x $(BIN)/python || { echo "setting up: new environment in $(VENV)"; $(PYTHON) -m venv $(VENV) || \
-	  { echo "the venv module is missing; on Debian: apt install python3-venv"; exit 2; }; }
+	@echo "setting up: new environment in $(VENV)"; $(PYTHON) -m venv $(VENV) || \
+	  { echo "the venv module is missing; on Debian: apt install python3-venv"; exit 2; }
+
+$(STAMP): pyproject.toml constraints.txt | $(BIN)/python
 	@echo "setting up: torch (the largest part, a few minutes on a slow line)"
 	@$(BIN)/pip install --quiet -c constraints.txt "$$(grep '^torch==' constraints.txt)"
 	@echo "setting up: everything else"
 	@$(BIN)/pip install --quiet -c constraints.txt -e '.[dev]'
+	@touch $@ $(PLAY_STAMP)
+
+$(PLAY_STAMP): pyproject.toml constraints.txt | $(BIN)/python
+	@echo "setting up: what playing needs, which is not torch"
+	@$(BIN)/pip install --quiet -c constraints.txt -e '.[play]'
 	@touch $@
 
 train: $(STAMP) ## train two fencers on this machine and write a report
 	@$(BIN)/riposte train $(ARGS)
 
-play: $(STAMP) ## fence against the robot in a browser; ARGS='--antagonist heuristic' needs none
+play: $(PLAY_STAMP) ## fence against the robot in a browser; ARGS='--antagonist heuristic' needs none
 	@$(BIN)/riposte play $(ARGS)
 
 test: $(STAMP) ## unit, property, integration and replay tests

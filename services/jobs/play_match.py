@@ -114,7 +114,6 @@ class Match:
         self._rest_until = now + terms.rest
         self._moved_at = now
         """When the match waited for nobody last."""
-        self._started = 0
         self._recorded = ""
         """The bout whose end was entered last."""
         self._events: list[str] = []
@@ -305,10 +304,9 @@ class Match:
         elif now < self._rest_until:
             self.waits_for = ""
         elif now >= self._retry_at:
-            self._started += 1
             asked = PlayRequest(
                 action="start",
-                bout=f"bout-{self._started}",
+                bout=f"bout-{len(self.results) + 1}",
                 antagonist=self.terms.antagonist,
                 protagonist=self.terms.protagonist,
             )
