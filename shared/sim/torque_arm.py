@@ -19,6 +19,11 @@ from shared.sim.parameters import ModelParameters
 from shared.sim.servo import CYCLE
 
 JOINTS: Final = 7
+COAST_FRICTION: Final = 0.25
+"""Of every joint without power (N m): about what a motor needs to turn without a load, 4 mN m,
+times the reduction, 33 to 63."""
+_SLOW: Final = 0.05
+"""Friction is in full from here on (rad/s)."""
 _AGENT: Final = AGENTS[1]
 
 
@@ -48,7 +53,8 @@ class TorqueArm:
         self._data = mujoco.MjData(self._mj)
         torso = self._mj.site(f"{_AGENT}/torso").id
         self._tool = self._mj.site(f"{_AGENT}/tool").id
-        self._data.qpos[:] = FencingModel.of(cfg, parameters).en_garde[1]
+        self._en_garde = FencingModel.of(cfg, parameters).en_garde[1]
+        self._data.qpos[:] = self._en_garde
         mujoco.mj_forward(self._mj, self._data)
         self._torso_in_world: Float64 = self._data.site_xpos[torso].copy()
         self._world_from_torso: Float64 = self._data.site_xmat[torso].reshape(3, 3).copy()
@@ -65,6 +71,12 @@ class TorqueArm:
         """float64[6, 7]: linear, then angular velocity of the tool in the torso frame."""
         self.is_blocked = False
         """Whether something holds the joints where they are, whatever torque there is."""
+        self.sense()
+
+    def put_back(self) -> None:
+        """Put it at rest en garde, as a person does by hand."""
+        self._data.qpos[:] = self._en_garde
+        self._data.qvel[:] = 0.0
         self.sense()
 
     def sense(self) -> None:
@@ -88,9 +100,11 @@ class TorqueArm:
     def coast(self) -> None:
         """Go on for one cycle with motors that have no power.
 
-        How a PR2's joints coast is not known; they brake as the model's do, cubic part included.
+        How a PR2's joints coast was never measured. They brake as the model's do, cubic part
+        included, and by the motors' own friction; that of the gears comes on top, unknown.
         """
-        self.drive(-self._cubic * self.qd**3)
+        friction = COAST_FRICTION * np.tanh(self.qd / _SLOW)
+        self.drive(-self._cubic * self.qd**3 - friction)
 
     def push(self, force: Float64) -> None:
         """Pull at the tool from now on: float64[3] in the torso frame (N); zeros let go."""

@@ -45,6 +45,8 @@ class ArmMoment:
     """float64[3] of the tool (m/s)."""
     efforts: Float64
     """float64[7], measured (N m)."""
+    force: Float64
+    """float64[6] that running Cartesian controllers put on the tool, linear first (N, N m)."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +64,17 @@ class HeardCommand:
 class FakePr2:
     """A robot that is there from construction until it is closed."""
 
-    def __init__(self, cfg: FakePr2Config | None = None, clock: Clock | None = None) -> None:
+    def __init__(
+        self, cfg: FakePr2Config | None = None, clock: Clock | None = None, *,
+        is_driven: bool = False,
+    ) -> None:  # fmt: skip
         """Start a master, the robot's parameters, node and services, and the robot itself.
+
+        Args:
+            cfg: settings.
+            clock: the robot's; this machine's if None.
+            is_driven: whether whoever moves the clock also calls ``catch_up``; else it keeps up
+                by itself.
 
         Raises:
             ConfigError: Debian's rosmaster is not installed, the port is taken, or the model that
@@ -86,18 +97,18 @@ class FakePr2:
                 self._node.set_param(f"/{namespace}", values)
             self._wires = Wires(self._node, self._wall_ns, self.cfg.sim.torso_lift)
             self._robot = Robot(self.cfg, self._wires)
-            self._began_at = self._clock.now()
+            self._began_at, self._began_ns = self._clock.now(), self._clock.wall_ns()
             self._lost_seconds = 0.0
+            self._frozen_at: float | None = None
             for name in self.cfg.running:
                 if self.load(name):
                     self.switch([name], [])
             self._serve()
             self._node.wait_registered(5.0)
             undo.pop_all()
-        self._began_at = self._clock.now()
-        self._frozen_at: float | None = None
         self._thread = threading.Thread(target=self._run, name="fake-pr2", daemon=True)
-        self._thread.start()
+        if not is_driven:
+            self._thread.start()
 
     @property
     def master_uri(self) -> str:
@@ -139,6 +150,12 @@ class FakePr2:
         """Pull at the tool from now on: x, y and z in the torso frame (N); zeros let go."""
         with self._lock:
             self._robot.mechanism.arm.push(np.array(force))
+
+    def put_back(self) -> None:
+        """Put the arm en garde by hand; what runs on it holds it there."""
+        with self._lock:
+            self._robot.mechanism.arm.put_back()
+            self._robot.switch(self._running(), [])
 
     def mute(self, *topics: str) -> None:
         """Publish nothing on these topics, and on all others again."""
@@ -186,8 +203,7 @@ class FakePr2:
     def running(self) -> tuple[str, ...]:
         """Return the names of the controllers that run."""
         with self._lock:
-            found = self._robot.mechanism.controllers
-            return tuple(name for name, controller in found.items() if controller.is_running)
+            return tuple(self._running())
 
     @property
     def is_halted(self) -> bool:
@@ -214,7 +230,8 @@ class FakePr2:
         if self._stop.is_set():
             return
         self._stop.set()
-        self._thread.join(5.0)
+        if self._thread.is_alive():
+            self._thread.join(5.0)
         self._node.close()
         self._master.close()
 
@@ -224,10 +241,14 @@ class FakePr2:
     def __exit__(self, *exception: object) -> None:
         self.close()
 
+    def catch_up(self) -> None:
+        """Make all the cycles that are due."""
+        while self._catch_up():
+            pass
+
     def _run(self) -> None:
         while not self._stop.wait(_WAKE_SECONDS):
-            while self._catch_up():
-                pass
+            self.catch_up()
 
     def _catch_up(self) -> bool:
         """Make some of the cycles that are due; return whether more are."""
@@ -237,7 +258,7 @@ class FakePr2:
             now = self._clock.now()
             self._hear()
             mechanism = self._robot.mechanism
-            due = int(self._time_at(now) / CYCLE) - mechanism.cycles
+            due = int(self._time_at(now) / CYCLE + 1e-6) - mechanism.cycles
             if due > MOST_BEHIND:
                 lost = due - MOST_BEHIND
                 self.cycles_lost += lost
@@ -259,7 +280,7 @@ class FakePr2:
 
     def _wall_ns(self) -> int:
         """Return the wall clock at the robot's cycle, which may be a little behind."""
-        return self._clock.wall_ns() - int(1e9 * (self._clock.now() - self._instant()))
+        return self._began_ns + round(1e9 * (self._instant() - self._began_at))
 
     def _remember(self) -> None:
         mechanism = self._robot.mechanism
@@ -270,8 +291,13 @@ class FakePr2:
                 tool=pose_of(arm),
                 velocity=arm.jacobian[:3] @ arm.qd,
                 efforts=mechanism.measured.copy(),
+                force=mechanism.cart_force(),
             )
         )
+
+    def _running(self) -> list[str]:
+        found = self._robot.mechanism.controllers
+        return [name for name, controller in found.items() if controller.is_running]
 
     def _hear(self) -> None:
         """Take what was published for the controllers."""

@@ -108,6 +108,8 @@ class JtCartesian:
         self._uses_posture = False
         self._velocity = np.zeros(JOINTS)
         self._cycles = 0
+        self.force = np.zeros(6)
+        """float64[6] of the last cycle, linear first (N, N m)."""
         self.state: JtState | None = None
         """Of the last cycle that published."""
 
@@ -151,7 +153,7 @@ class JtCartesian:
         wanted = -(self.kp / self.kd) * error
         wanted[:3] = _shortened(wanted[:3], cfg.vel_saturation_trans)
         wanted[3:] = _shortened(wanted[3:], cfg.vel_saturation_rot)
-        force = self.kd * (wanted - moving)
+        self.force = force = self.kd * (wanted - moving)
         tau_pose = jacobian.T @ force
         tau_posture = np.zeros(JOINTS)
         is_shown = self._cycles % self.publish_every == 0

@@ -162,6 +162,14 @@ class Mechanism:
         found = self.controllers.get(name)
         return found if isinstance(found, JtCartesian) else None
 
+    def cart_force(self) -> Float64:
+        """Return float64[6], what all running Cartesian controllers put on the tool (N, N m)."""
+        total = np.zeros(6)
+        for controller in self._running():
+            if isinstance(controller, JtCartesian):
+                total = total + controller.force
+        return total
+
     def _make(self, parameters: Mapping[str, Any]) -> Controller | None:
         name = parameters.get("type")
         if name == jt_cartesian.TYPE:
