@@ -94,6 +94,7 @@ export class Hud {
     mark("gate", gate?.mode ?? "");
     put("gate-mode", gate?.mode ?? "robot");
     let words = gate ? `The robot ${GATE_WORDS[gate.mode]}` : "not heard of yet";
+    if (gate?.mode === "disarmed" && gate.reason.startsWith("disarmed ")) words = `The robot was ${gate.reason}.`;
     if (gate?.mode === "armed" && frame.step === "bout") words = "The robot fences.";
     if (gate?.reason && (gate.mode === "holding" || gate.mode === "tripped")) words += `: ${gate.reason}.`;
     put("gate-words", words);

@@ -11,6 +11,7 @@ function loop(now) {
   drawn += scene.draw(now);
   if (now - since >= 1000) {
     postMessage({ type: "drawn", perSecond: (1000 * drawn) / (now - since), device: scene.device, isFine: scene.isFine });
+    scene.adapt((1000 * drawn) / (now - since));
     [drawn, since] = [0, now];
   }
   next(loop);

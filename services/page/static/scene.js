@@ -10,6 +10,8 @@ const SLOW = /swiftshader|llvmpipe|software|basic render/i;
 const PLAIN_RATIO = 0.6; // pixels of the picture for each of the page, without a GPU
 const PLAIN_MS = 50; // from picture to picture there: the loop that moves the bats needs the processor
 const STILL_MS = 1000;
+const TOO_FEW = 40; // pictures a second; with fewer, a GPU gets fewer pixels to draw
+const LEAST_SCALE = 0.5;
 
 const quaternion = ([w, x, y, z]) => new THREE.Quaternion(x, y, z, w);
 
@@ -44,9 +46,11 @@ export class BoutScene {
     this.aim = new THREE.Vector3(...VIEWS.player.aim);
     this.view = VIEWS.player;
     this.aspect = 1;
+    this.size = [1, 1, 1];
+    this.scale = quality === "auto" && this.isFine ? 1 : null; // of the pixels; null: as they are
+    this.seconds = 0;
     this.state = null;
     this.drawnAt = 0;
-    this.seconds = 0;
   }
 
   /** Hang the solids on the bodies, the bodies on each other. */
@@ -98,10 +102,19 @@ export class BoutScene {
   }
 
   resize(width, height, ratio) {
+    this.size = [width, height, ratio];
     this.aspect = width / Math.max(height, 1);
-    this.renderer.setPixelRatio(this.isFine ? Math.min(ratio, 2) : PLAIN_RATIO);
+    this.renderer.setPixelRatio(this.isFine ? Math.min(ratio, 2) * (this.scale ?? 1) : PLAIN_RATIO);
     this.renderer.setSize(width, height, false);
     this.camera.aspect = this.aspect;
+  }
+
+  /** Draw fewer pixels where a whole second had too few pictures; called once a second. */
+  adapt(perSecond) {
+    this.seconds += 1; // the first ones are spent on shaders, a hidden page draws nothing
+    if (this.scale === null || this.seconds < 4 || perSecond < 5 || perSecond >= TOO_FEW) return;
+    this.scale = Math.max(0.8 * this.scale, LEAST_SCALE);
+    this.resize(...this.size);
   }
 
   /** Take the newest frame of the service, and which view is wanted. */
