@@ -49,7 +49,12 @@ LAPTOP: tuple[str, ...] = (
 )
 """Over the defaults where no site file is given, as in deploy/play.toml: the robot that policies
 were trained on, which answers faster than the real one; nobody can be hurt by a simulated one."""
-HEURISTIC = ("Heuristic", "scripted:heuristic")
+HEURISTICS = (
+    ("Heuristic", "scripted:heuristic"),
+    ("Heuristic, not camping", "scripted:heuristic-retreating"),
+    ("Guard", "scripted:guard"),
+)
+"""Scripted protagonists to choose from on the page."""
 
 
 class Plan(msgspec.Struct, frozen=True, kw_only=True):
@@ -255,8 +260,8 @@ def _page(
 
 def _players(chosen: Seat) -> tuple[tuple[str, str], ...]:
     """Return the protagonists to choose from on the page, the chosen one first."""
-    is_heuristic = chosen.player == HEURISTIC[1]
-    players = {HEURISTIC[0] if is_heuristic else chosen.label: chosen.player}
+    scripted = {player: name for name, player in HEURISTICS}
+    players = {scripted.get(chosen.player, chosen.label): chosen.player}
     try:
         loaded = load_bundle(shipped_bundle())
     except SnapshotError:  # there is somebody to play against all the same
@@ -265,8 +270,9 @@ def _players(chosen: Seat) -> tuple[tuple[str, str], ...]:
         for player in loaded.bundle.players:
             path = loaded.folder / f"{player.sha256}.safetensors"
             players.setdefault(player.name, str(path))
-    if HEURISTIC[1] not in players.values():
-        players.setdefault(*HEURISTIC)
+    for name, player in HEURISTICS:
+        if player != chosen.player:
+            players.setdefault(name, player)
     return tuple(players.items())
 
 

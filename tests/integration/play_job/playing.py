@@ -24,8 +24,10 @@ from tests.integration.training.training import ROOT, log_of, processes_of
 
 X = TypeVar("X")
 QUICK = (
-    "play.record=false", "play.rest=0.0", "safety.ramp=0.5", "policy.stale_after=1.0",
-    "referee.stale_after=0.5",
+    "play.record=false", "play.rest=0.0", "safety.ramp=0.5", "safety.command_hold=0.5",
+    "safety.tracker_hold=0.5", "safety.state_hold=0.5", "policy.stale_after=1.0",
+    "policy.referee_silence=2.0", "robot_io.referee_silence=2.0", "referee.stale_after=1.0",
+    "referee.void_after=10.0",
 )  # fmt: skip
 """A match on a machine that tests keep busy."""
 

@@ -73,7 +73,9 @@ def test_without_arguments_a_person_with_a_mouse_meets_the_first_selected_style(
     assert settings["page"]["pointer"] is True
     assert settings["page"]["antagonist"] == "person"
     names = [name for name, _ in settings["page"]["players"]]
-    assert names == ["style-1", "warm-start", "style-2", "style-3", "Heuristic"]
+    assert names == [
+        "style-1", "warm-start", "style-2", "style-3", "Heuristic", "Heuristic, not camping", "Guard",
+    ]  # fmt: skip
     assert settings["page"]["players"][0][1] == settings["policy"]["protagonist"]
     assert str(plan.folder).startswith("runs/play-")
     assert not plan.folder.exists()
@@ -251,7 +253,9 @@ def test_an_installation_without_a_bundle_says_what_to_do(
         monkeypatch.setattr(module, "shipped_bundle", none)
     assert "no protagonist is named, and no bundle came with" in refused(capsys)
     plan, settings = planned("--protagonist", "heuristic")
-    assert [name for name, _ in settings["page"]["players"]] == ["Heuristic"]
+    assert [name for name, _ in settings["page"]["players"]] == [
+        "Heuristic", "Heuristic, not camping", "Guard",
+    ]  # fmt: skip
     assert plan.has_page
 
 
