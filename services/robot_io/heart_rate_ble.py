@@ -117,8 +117,11 @@ class BleStrap:
                 await session
             except asyncio.CancelledError:
                 return
-            except (BleakError, OSError, EOFError, TimeoutError, AssertionError) as error:
+            except (BleakError, OSError, EOFError, TimeoutError) as error:
                 self._fail(_reason(error))
+            except Exception as error:  # a library's bug costs this try, not the ones to come
+                if self._fail(f"bug: {type(error).__name__}: {error}; trying again"):
+                    log.exception("heart_rate_crashed")
             if self._heard_at > before:
                 wait = self._cfg.retry_first
             with contextlib.suppress(TimeoutError):
@@ -197,11 +200,14 @@ class BleStrap:
         )
         self._waiting.append(beat)
 
-    def _fail(self, reason: str) -> None:
-        """Log a reason once, and keep it for ``riposte status``."""
-        if reason != self._problem:
+    def _fail(self, reason: str) -> bool:
+        """Log a reason once, and keep it for ``riposte status``; return whether it is new."""
+        reason = " ".join(reason.split())
+        is_new = reason != self._problem
+        if is_new:
             log.warning("heart_rate_unavailable", reason=reason)
         self._problem = reason
+        return is_new
 
 
 def _reason(error: Exception) -> str:

@@ -211,6 +211,31 @@ def test_no_message_bus_is_one_clear_line(monkeypatch: pytest.MonkeyPatch, open_
     ]
 
 
+def test_a_bug_of_a_library_costs_one_try_and_is_logged_once(
+    bluez: FakeBluez, open_strap, monkeypatch: pytest.MonkeyPatch
+):
+    tries: list[int] = []
+    find = BleStrap._find
+
+    async def find_late(self: BleStrap):
+        tries.append(1)
+        if len(tries) < 4:
+            raise KeyError("Roles")
+        return await find(self)
+
+    monkeypatch.setattr(BleStrap, "_find", find_late)
+    with capture_logs() as logs:
+        strap = open_strap()
+        assert bluez.wait_for_listener(SECONDS)
+        until(lambda: strap.problem == "")
+    said = [(line["event"], line.get("reason")) for line in logs]
+    assert said == [
+        ("heart_rate_unavailable", "bug: KeyError: 'Roles'; trying again"),
+        ("heart_rate_crashed", None),
+        ("heart_rate_connected", None),
+    ]
+
+
 def test_closing_while_it_searches_takes_no_time(bluez: FakeBluez, open_strap):
     bluez.is_advertising = False
     strap = open_strap(search_seconds=60.0)
