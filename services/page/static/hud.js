@@ -38,9 +38,10 @@ export class Hud {
     $("choice").value = hello.chosen;
     put("who-antagonist", hello.is_person ? "You" : hello.antagonist);
     const { point, penalty, camping_award: award, camping_seconds: camping } = hello.rules;
-    put("rules", `Every 10 ms: ${signed(point)} with your bat in the target, ${signed(penalty)} if the bats `
+    const whose = hello.is_person ? "your" : "the antagonist's";
+    put("rules", `Every 10 ms: ${signed(point)} with ${whose} bat in the target, ${signed(penalty)} if the bats `
       + `touch then, ${signed(award)} when the robot's bat has waited in it for over ${camping} s. `
-      + "It sounds high while you score, low when you are caught.");
+      + "It sounds high for points, low for a penalty.");
     $("help-person").hidden = !hello.pointer;
   }
 

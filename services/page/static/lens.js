@@ -3,7 +3,7 @@
 
 export const VIEWS = {
   player: { eye: [2.2, -0.72, 1.86], aim: [-0.3, 0.02, 1.05], fov: 43 },
-  audience: { eye: [0.55, -3.25, 1.62], aim: [0.0, 0.0, 0.86], fov: 40 },
+  audience: { eye: [0.55, -3.3, 1.62], aim: [0.0, 0.0, 0.98], fov: 43 },
 };
 const WIDEST = 1.55; // below this aspect the picture keeps its width and gains height
 
