@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -76,7 +76,10 @@ class Playing:
 
 
 @contextlib.contextmanager
-def playing(folder: Path, *words: str, overrides: tuple[str, ...] = QUICK) -> Iterator[Playing]:
+def playing(
+    folder: Path, *words: str, overrides: tuple[str, ...] = QUICK,
+    environment: Mapping[str, str] | None = None,
+) -> Iterator[Playing]:  # fmt: skip
     """Start a match, and leave no process of it behind."""
     command = [sys.executable, "-m", "services.cli", "play", "--out", str(folder), *words]
     command += [word for override in overrides for word in ("--set", override)]
@@ -84,7 +87,7 @@ def playing(folder: Path, *words: str, overrides: tuple[str, ...] = QUICK) -> It
     with said.open("w") as output:
         process = subprocess.Popen(
             command, cwd=ROOT, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
-            text=True,
+            text=True, env={**os.environ, **(environment or {})},
         )  # fmt: skip
     try:
         yield Playing(folder, process, said)

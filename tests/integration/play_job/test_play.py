@@ -1,6 +1,8 @@
 """A match between two policies, by the command that a person types."""
 
+import json
 import signal
+import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -79,6 +81,43 @@ def test_ctrl_c_ends_in_order_and_a_person_reaches_the_robot_before(
     ]  # fmt: skip
     assert stopped == started[::-1]
     assert {event["exit_code"] for event in events if event["event"] == "process_stopped"} == {0}
+
+
+def test_without_arguments_there_is_a_page_which_the_browser_is_sent_to(tmp_path: Path):
+    folder = tmp_path / "match"
+    browser = tmp_path / "browser"
+    browser.write_text(f'#!/bin/sh\necho "$1" > {tmp_path}/opened\n')
+    browser.chmod(0o755)
+    with playing(folder, environment={"BROWSER": str(browser)}) as match:
+        opened = tmp_path / "opened"
+        url = match.until(lambda: opened.exists() and opened.read_text().strip())
+        assert f"page: {url}" in match.said
+        with urllib.request.urlopen(f"{url}/", timeout=20) as answer:
+            assert b"<html" in answer.read().lower()
+        with urllib.request.urlopen(f"{url}/scene.json", timeout=20) as answer:
+            assert "links" in json.load(answer)
+        match.until(lambda: "robot disarmed: nobody has armed it" in match.said)
+        match.process.send_signal(signal.SIGINT)
+        code, said = match.finish()
+    assert code == 0, said
+    assert "mouse v style-1: no bout came to its end" in said
+    assert processes_of(folder) == []
+    assert not (folder / "page.json").exists()
+    assert [event for event in log_of(folder, "robot-io-0") if event["event"] == "gate_asked"
+            and event["action"] == "arm"] == []  # fmt: skip
+
+
+def test_what_a_process_refuses_ends_the_match_in_its_words(tmp_path: Path):
+    site = tmp_path / "s.toml"
+    site.write_text(f'[robot_io]\ntracker = "replay"\nreplay = "{tmp_path}/none.npy"\n')
+    folder = tmp_path / "match"
+    with playing(folder, str(site), "--no-browser", overrides=("play.record=false",)) as match:
+        code, said = match.finish()
+    assert code == 2, said
+    assert f"cannot read the recorded bat {tmp_path}/none.npy" in said
+    assert "Traceback" not in said
+    assert processes_of(folder) == []
+    assert "robot-io-0" in match.summary["ended"]
 
 
 def test_nobody_there_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

@@ -74,7 +74,8 @@ def test_without_arguments_a_person_with_a_mouse_meets_the_first_selected_style(
     assert settings["page"]["antagonist"] == "person"
     names = [name for name, _ in settings["page"]["players"]]
     assert names == [
-        "style-1", "warm-start", "style-2", "style-3", "Heuristic", "Heuristic, not camping", "Guard",
+        "style-1", "warm-start", "style-2", "style-3",
+        "Heuristic", "Heuristic, not camping", "Guard",
     ]  # fmt: skip
     assert settings["page"]["players"][0][1] == settings["policy"]["protagonist"]
     assert str(plan.folder).startswith("runs/play-")
