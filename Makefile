@@ -73,6 +73,7 @@ bench: $(STAMP) ## list the benchmarks; make bench ARGS='actor --write' measures
 
 docs: $(STAMP) ## renew the generated parts of docs/ and deploy/
 	@$(BIN)/python -m shared.messages.table --write docs/architecture.md
+	@$(BIN)/python -m shared.telemetry.columns docs/recordings.md
 	@$(BIN)/python -m services.jobs.site > deploy/local.toml.new && mv deploy/local.toml.new deploy/local.toml
 
 clean: ## remove the environment, caches and builds; runs/ stays

@@ -53,7 +53,6 @@ EXTRAS = {
     "matplotlib": "train",
     "sklearn": "styles",
     "scipy": "styles",
-    "pyarrow": "styles",
     "onnx": "styles",
     "gymnasium": "env",
     "pettingzoo": "env",

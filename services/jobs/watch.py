@@ -65,7 +65,8 @@ def _show_recordings(folder: Path, port: int, *, browser: bool) -> int:
     files = [str(path) for path in recordings(folder)]
     if not files:
         raise ConfigError(
-            f"{folder} has no recording (recording.rrd); it was made with train.record = false"
+            f"{folder} has no recording (recording.rrd); it was made with train.record = false, "
+            "play.record = false or recorder.file = false"
         )
     clock = SystemClock()
     with (

@@ -390,19 +390,3 @@ MESSAGES: dict[str, type[Message]] = {
     SERVICES.name: ServiceStatus,
 }
 """What the rows of each stream are made of."""
-
-
-def describe() -> str:
-    """Return the streams and their columns as Markdown tables, for the documentation."""
-    parts: list[str] = []
-    for stream in STREAMS:
-        rate = f"{stream.rate_hz:g} Hz" if stream.rate_hz else "as it comes"
-        parts += [f"### {stream.name}", f"{stream.about[0].upper()}{stream.about[1:]}; {rate}.", ""]
-        parts += ["| Column | Unit | Type | What |", "|---|---|---|---|"]
-        for column in stream.columns:
-            width = f"[{column.width}]" if column.width else ""
-            kind = DTYPES[column.kind].name if column.kind != "text" else "string"
-            unit = column.unit or "-"
-            parts.append(f"| `{column.name}` | {unit} | {kind}{width} | {column.about} |")
-        parts.append("")
-    return "\n".join(parts).rstrip()

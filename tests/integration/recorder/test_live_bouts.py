@@ -40,6 +40,22 @@ for step in range(100_000):
     if step % 10 == 0:
         print(fencing.tick, flush=True)
 """
+FULL_DISK = """
+import resource, signal, sys
+from pathlib import Path
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+from tests.unit.recorder.test_live import EN_GARDE, ONLY_ARCHIVE, Fencing, RuleBook, moving
+fencing = Fencing(Path(sys.argv[1]), ONLY_ARCHIVE, rules=RuleBook(bout_steps=600))
+resource.setrlimit(resource.RLIMIT_FSIZE, (120_000, 120_000))
+fencing.start("one", EN_GARDE)
+for step in range(600):
+    fencing.bring(moving(step))
+fencing.rest(EN_GARDE, 100)
+health = fencing.recorder.health()
+print(health.last_error)
+print(health.counters["bouts_unarchived"], health.counters["bouts_archived"])
+fencing.recorder.close()
+"""
 
 
 class Match(Site):
@@ -158,6 +174,21 @@ def test_bouts_between_processes_are_recorded_and_one_outlives_its_recorder(matc
         assert len(inside) == pytest.approx(STEPS, rel=0.05), series.path
     assert found["bout/scene/poses"]
     assert found["services/cpu_percent/robot-io-0"]
+
+
+def test_a_full_disk_ends_the_archive_of_the_bout_and_what_was_written_can_be_read(tmp_path: Path):
+    done = subprocess.run(
+        [sys.executable, "-c", FULL_DISK, str(tmp_path)], capture_output=True, text=True,
+        timeout=60, check=True,
+    )  # fmt: skip
+    said = done.stdout.splitlines()
+    assert "the archive of bout one ended early: File too large" in said
+    assert "1 0" in said
+    bout = load_bout(archived_bouts(tmp_path)[0])
+    assert bout.info.outcome == "running"  # as after a kill: the next recorder finishes it
+    ticks = bout.streams["bats"]["tick"]
+    assert 100 < len(ticks) < 600
+    np.testing.assert_array_equal(np.diff(ticks), 1)
 
 
 def test_what_was_archived_survives_a_kill_but_for_the_last_moment(tmp_path: Path):
