@@ -15,7 +15,7 @@ import shutil
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -53,9 +53,9 @@ PERIOD_MS = 10.0
 class Site:
     """The processes of a match, and a seat to watch from; who watches is the person."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, settings: Sequence[str] = SETTINGS) -> None:
         words = [*MATCH, "--out", str(folder / "match")]
-        plan = plan_of(parse([*words, *(word for item in SETTINGS for word in ("--set", item))]))
+        plan = plan_of(parse([*words, *(word for item in settings for word in ("--set", item))]))
         plan.folder.mkdir(parents=True)
         (plan.folder / "config.toml").write_text(plan.settings, encoding="utf-8")
         self.endpoint = f"tcp/127.0.0.1:{free_port()}"
@@ -128,6 +128,11 @@ class Site:
                 raise RiposteError("robot_io says nothing of itself")
             self.tick()
         return self.status
+
+    @property
+    def pids(self) -> dict[str, int]:
+        """Return the process ids by name."""
+        return self._supervisor.pids
 
     def close(self) -> None:
         """End all processes."""
