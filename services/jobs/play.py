@@ -52,13 +52,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     plan = plan_of(found)
     console = Console(stderr=found.json)
     folder = plan.folder
-    with RunLock(folder):
+    with RunLock(folder), Path(os.devnull).open("w") as nowhere:  # the screen says what happens
         require_free_space(folder, FREE_BYTES)
         atomic_write(folder / "config.toml", plan.settings.encode())
         _point_latest_at(folder)
         configure_logging(
-            folder / "logs" / "play.jsonl", bound={"service": "play", "run_id": plan.run}
-        )
+            folder / "logs" / "play.jsonl", console=nowhere,
+            bound={"service": "play", "run_id": plan.run},
+        )  # fmt: skip
         # A signal ends the loop below; the deadline is for processes that will not stop.
         with stop_on_signals(deadline=180.0) as stop:
             course = Course(plan, console, stop, browser=not found.no_browser)
