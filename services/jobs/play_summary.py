@@ -102,7 +102,8 @@ def summary_text(folder: Path, match: PlayedMatch) -> str:
     if match.loop:
         lines.append(loop_text(match.loop))
     lines += [f"died: {name}" for name in match.deaths]
-    lines.append(f"recording  riposte watch {folder}")
+    if (folder / "recording.rrd").exists():
+        lines.append(f"recording  riposte watch {folder}")
     return "\n".join(lines)
 
 

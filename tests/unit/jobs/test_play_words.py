@@ -66,6 +66,9 @@ def test_a_summary_keeps_every_bout_and_counts_the_whole_ones(plan: Plan, tmp_pa
     )
     assert "900 ticks, 3 late, 1 lost, 12 without an answer" in text
     assert "died: referee-0 died" in text
+    assert "riposte watch" not in text
+    (tmp_path / "recording.rrd").touch()
+    assert summary_text(tmp_path, played).endswith(f"recording  riposte watch {tmp_path}")
 
 
 def test_a_match_that_never_began_has_a_summary_too(plan: Plan, tmp_path: Path):
