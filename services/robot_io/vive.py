@@ -1,5 +1,6 @@
 """The Vive tracker on a person's bat: from SteamVR's poses to a bat in the world."""
 
+import importlib.util
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,9 @@ from services.robot_io.dock import DockCheck
 from services.robot_io.frames import composed
 from services.robot_io.poses import Pose, length
 from services.robot_io.trackers import LOST_SECONDS, Follower, TrackedBat
+from services.robot_io.vive_child import ViveChild
 from services.robot_io.vive_config import ViveConfig
-from services.robot_io.vive_device import ViveDevice
-from services.robot_io.vive_source import PollThread, Sample, ViveSource
+from services.robot_io.vive_source import Sample, Source
 from shared.bus.base import Bus
 from shared.clock import Clock
 from shared.errors import ConfigError
@@ -32,8 +33,8 @@ class ViveTracker:
     """The bat that a tracker is mounted on; without a usable calibration it is never tracked."""
 
     def __init__(
-        self, cfg: ViveConfig, source: ViveSource, world_from_torso: Pose, start: Pose,
-        bus: Bus, clock: Clock, thread: PollThread | None = None,
+        self, cfg: ViveConfig, source: Source, world_from_torso: Pose, start: Pose,
+        bus: Bus, clock: Clock,
     ) -> None:  # fmt: skip
         """Read the calibration.
 
@@ -44,18 +45,15 @@ class ViveTracker:
             start: where the bat is shown until it is seen.
             bus: takes the raw poses, for a calibration.
             clock: tells the age of the calibration.
-            thread: polls the source, and is closed with this; None where the caller polls.
         """
         self._cfg = cfg
         self._source = source
-        self._thread = thread
         self._bus = bus
         self._clock = clock
         self._follower = Follower(start)
         self._raw: Sample | None = None
         self._seen_at: float | None = None
         self._counters = {"tracker_dropouts": 0, "tracker_flown": 0}
-        self._polled = (clock.now(), 0)
         self._uncalibrated = ""
         self._calibration: Calibration | None = None
         try:
@@ -99,12 +97,9 @@ class ViveTracker:
 
     def rates(self) -> dict[str, float]:
         """Return how fast SteamVR is asked, and what it says of the tracker."""
-        now, polls = self._clock.now(), self._source.counters["tracker_polls"]
-        before, polled = self._polled
-        self._polled = (now, polls)
         status = self._source.status
         rates = {
-            "tracker_polls_per_s": (polls - polled) / (now - before) if now > before else 0.0,
+            "tracker_polls_per_s": status.polls_per_s,
             "tracker_connected": float(status.is_connected),
             "tracker_check_due": float(self._dock.is_due),
         }
@@ -124,9 +119,8 @@ class ViveTracker:
         }
 
     def close(self) -> None:
-        """Stop polling."""
-        if self._thread is not None:
-            self._thread.close()
+        """Let go of SteamVR."""
+        self._source.close()
 
     def _take(self, sample: Sample) -> None:
         if self._seen_at is not None and sample.at - self._seen_at > LOST_SECONDS:
@@ -175,11 +169,12 @@ class ViveTracker:
 def open_vive(
     cfg: ViveConfig, world_from_torso: Pose, start: Pose, bus: Bus, clock: Clock
 ) -> ViveTracker:
-    """Return the tracker, followed on a thread of its own.
+    """Return the tracker, followed by a process of its own.
 
     Raises:
-        SteamVrError: SteamVR can never be used here; says what to do.
+        ConfigError: openvr is not installed.
+        RobotFault: SteamVR can never be used here; says what to do.
     """
-    source = ViveSource(ViveDevice(), cfg.serial, clock)
-    thread = PollThread(source)
-    return ViveTracker(cfg, source, world_from_torso, start, bus, clock, thread)
+    if importlib.util.find_spec("openvr") is None:
+        raise ConfigError("tracker = 'vive' needs openvr: pip install 'riposte[robot]'")
+    return ViveTracker(cfg, ViveChild(cfg.serial), world_from_torso, start, bus, clock)

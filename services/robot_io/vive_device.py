@@ -6,15 +6,15 @@ everything here belongs to one thread, and not to that of the loop.
 """
 
 import ctypes
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import openvr
 from openvr.error_code import InitError
 
 from services.robot_io.frames import pose_of_rows
-from services.robot_io.poses import Pose, is_pose
-from shared.errors import RobotFault
+from services.robot_io.poses import is_pose
+from services.robot_io.vive_source import Sighting, SteamVrError
 
 GOOD = 200
 """The result of a pose that is tracked in all six degrees of freedom."""
@@ -27,24 +27,6 @@ _DAMAGED = (101, 102, 103, 104, 106)
 _TOO_OLD = 105
 _NO_HEADSET = (108, 125, 126)
 _NOT_RUNNING = (119, 121)
-
-
-class SteamVrError(RobotFault):
-    """SteamVR cannot be used, now or ever; its text says what to do."""
-
-    def __init__(self, text: str, *, is_final: bool = False) -> None:
-        super().__init__(text)
-        self.is_final = is_final
-        """Whether waiting does not help."""
-
-
-class Sighting(NamedTuple):
-    """What SteamVR says of the tracker at one moment."""
-
-    pose: Pose | None
-    """Tracker in the base stations' frame; None where it is not tracked well."""
-    is_connected: bool
-    result: int
 
 
 class ViveDevice:

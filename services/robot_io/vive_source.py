@@ -1,15 +1,14 @@
-"""Follows one tracker in SteamVR, 250 times a second, beside the loop and never in its way."""
+"""Follows one tracker in SteamVR: reaches it, finds the tracker, asks where it is."""
 
-import threading
 from collections import deque
+from collections.abc import Mapping
 from typing import NamedTuple, Protocol
 
 import msgspec
-import structlog
 
 from services.robot_io.poses import Pose
-from services.robot_io.vive_device import Sighting, SteamVrError
 from shared.clock import Clock
+from shared.errors import RobotFault
 
 PERIOD = 0.004
 """A tracker's own stream is 250 Hz; a pose is computed when it is asked for, and has no stamp."""
@@ -20,11 +19,24 @@ SEARCH_SECONDS = 1.0
 EVENT_SECONDS = 0.1
 KEPT = 64
 """Poses that wait to be taken; of more the oldest go."""
-OPEN_SECONDS = 10.0
-"""How long the start waits for SteamVR's first word."""
-JOIN_SECONDS = 3.0
 
-log = structlog.get_logger()
+
+class SteamVrError(RobotFault):
+    """SteamVR cannot be used, now or ever; its text says what to do."""
+
+    def __init__(self, text: str, *, is_final: bool = False) -> None:
+        super().__init__(text)
+        self.is_final = is_final
+        """Whether waiting does not help."""
+
+
+class Sighting(NamedTuple):
+    """What SteamVR says of the tracker at one moment."""
+
+    pose: Pose | None
+    """Tracker in the base stations' frame; None where it is not tracked well."""
+    is_connected: bool
+    result: int
 
 
 class Device(Protocol):
@@ -39,6 +51,28 @@ class Device(Protocol):
     def close(self) -> None: ...  # noqa: D102
 
 
+class Source(Protocol):
+    """Where poses come from; nothing here may block."""
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """Return what was counted since the start."""
+        ...
+
+    @property
+    def status(self) -> "Status":
+        """Return how it goes."""
+        ...
+
+    def take(self) -> "list[Sample]":
+        """Return the poses since the last time, oldest first."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the device."""
+        ...
+
+
 class Sample(NamedTuple):
     """A pose that counts."""
 
@@ -49,17 +83,21 @@ class Sample(NamedTuple):
 
 
 class Status(msgspec.Struct, frozen=True, kw_only=True):
-    """How it goes; replaced as a whole, so that another thread may read it."""
+    """How it goes."""
 
     problem: str
     """Why there are no poses; empty while there are."""
     is_connected: bool = False
     battery: float | None = None
     """0 to 1, where the tracker tells."""
+    is_final: bool = False
+    """Whether it never will work."""
+    polls_per_s: float = 0.0
+    """How often the tracker was asked for, over the last second."""
 
 
 class ViveSource:
-    """The tracker of one serial; ``poll`` belongs to one thread, the rest to any."""
+    """The tracker of one serial; it is polled by whoever owns it."""
 
     def __init__(self, device: Device, serial: str, clock: Clock) -> None:
         self._device = device
@@ -68,10 +106,9 @@ class ViveSource:
         """Stamps the poses."""
         self._samples: deque[Sample] = deque(maxlen=KEPT)
         self._is_open = self._is_found = False
+        self._rated = (clock.now(), 0)
         self._retry_at = self._search_at = self._events_at = self._battery_at = clock.now()
         self.status = Status(problem="SteamVR has not answered yet")
-        self.failure: SteamVrError | None = None
-        """Why it never will work."""
         self.counters = {
             "tracker_polls": 0,
             "tracker_poses": 0,
@@ -93,9 +130,8 @@ class ViveSource:
             else:
                 self._look(now)
         except SteamVrError as error:
-            self.failure = error if error.is_final else None
             self._retry_at = now + RETRY_SECONDS
-            self._say(Status(problem=str(error)))
+            self.status = Status(problem=str(error), is_final=error.is_final)
 
     def take(self) -> list[Sample]:
         """Return the poses since the last time, oldest first."""
@@ -105,14 +141,13 @@ class ViveSource:
         return taken
 
     def close(self) -> None:
-        """Let go of SteamVR; on the thread that polls."""
+        """Let go of SteamVR."""
         self._device.close()
 
     def _open(self, now: float) -> None:
-        if now < self._retry_at or self.failure is not None:
+        if now < self._retry_at or self.status.is_final:
             return
-        version = self._device.open()
-        log.info("steamvr_opened", version=version)
+        self._device.open()
         self.counters["steamvr_opened"] += 1
         self._is_open, self._is_found = True, False
         self._search_at = now
@@ -126,7 +161,7 @@ class ViveSource:
         self._device.close()
         self._is_open = self._is_found = False
         self._retry_at = now + RETRY_SECONDS
-        self._say(Status(problem=problem))
+        self.status = Status(problem=problem)
 
     def _find(self, now: float) -> None:
         if now < self._search_at:
@@ -135,10 +170,11 @@ class ViveSource:
         if self._device.find(self._serial):
             self._is_found = True
             self._battery_at = now
+            self._rated = (now, self.counters["tracker_polls"])
             return
         seen = ", ".join(self._device.seen()) or "none: switch it on, pair it in SteamVR"
         wanted = f"no tracker {self._serial}" if self._serial else "vive.serial names no tracker"
-        self._say(Status(problem=f"{wanted}; SteamVR sees {seen}"))
+        self.status = Status(problem=f"{wanted}; SteamVR sees {seen}")
 
     def _look(self, now: float) -> None:
         found = self._device.poll()
@@ -150,10 +186,14 @@ class ViveSource:
             self._samples.append(Sample(at, found.pose))
         else:
             self.counters["tracker_bad_poses"] += 1
-        battery = self.status.battery
+        battery, polls_per_s = self.status.battery, self.status.polls_per_s
         if now >= self._battery_at:
             self._battery_at = now + SEARCH_SECONDS
             battery = self._device.battery()
+            (since, before), polls = self._rated, self.counters["tracker_polls"]
+            self._rated = (at, polls)
+            if at - since >= 0.5 * SEARCH_SECONDS:
+                polls_per_s = (polls - before) / (at - since)
         if not found.is_connected:
             problem = f"the tracker {self._serial} is switched off or out of reach"
         elif found.pose is None:
@@ -162,50 +202,9 @@ class ViveSource:
             )
         else:
             problem = ""
-        self._say(Status(problem=problem, is_connected=found.is_connected, battery=battery))
-
-    def _say(self, status: Status) -> None:
-        if status != self.status:
-            self.status = status
-
-
-class PollThread:
-    """Polls a source at its rate until it is closed."""
-
-    def __init__(self, source: ViveSource) -> None:
-        """Start, and wait for the first word of SteamVR.
-
-        Raises:
-            SteamVrError: SteamVR can never be used here.
-        """
-        self._source = source
-        self._stop = threading.Event()
-        self._began = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="vive", daemon=True)
-        self._thread.start()
-        self._began.wait(OPEN_SECONDS)
-        if source.failure is not None:
-            self.close()
-            raise source.failure
-
-    def close(self) -> None:
-        """Stop, and let go of SteamVR if it answers in time."""
-        self._stop.set()
-        self._thread.join(JOIN_SECONDS)
-
-    def _run(self) -> None:
-        clock = self._source.clock
-        due = clock.now()
-        try:
-            while not self._stop.is_set():
-                self._source.poll()
-                self._began.set()
-                # A round that came late is left out: two poses at one moment tell no velocity.
-                due = max(due + PERIOD, clock.now() + 0.5 * PERIOD)
-                self._stop.wait(due - clock.now())
-        except Exception:  # the edge of the thread: without poses the gate holds the robot
-            log.critical("vive_crashed", exc_info=True)
-            self._source.status = Status(problem="the tracker's thread has crashed: see the log")
-        finally:
-            self._began.set()
-            self._source.close()
+        self.status = Status(
+            problem=problem,
+            is_connected=found.is_connected,
+            battery=battery,
+            polls_per_s=polls_per_s,
+        )

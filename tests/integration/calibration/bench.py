@@ -106,4 +106,3 @@ class Bench:
 
     def close(self) -> None:
         self.service.close()
-        self.source.close()

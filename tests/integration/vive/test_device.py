@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from services.robot_io.vive_device import RAW, SteamVrError, ViveDevice
+from services.robot_io.vive_device import RAW, ViveDevice
+from services.robot_io.vive_source import SteamVrError
 from shared.testing.fake_vive.runtime import OVERRIDE, FakeVive
 from tests.integration.robot_io.site import ROOT
 from tests.integration.vive.conftest import SERIAL

@@ -1,5 +1,7 @@
 """A tracker in real time: its rate, what is lost and comes back, what is not believed."""
 
+import signal
+import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -11,11 +13,11 @@ import pytest
 from services.robot_io.frames import IDENTITY
 from services.robot_io.trackers import TrackedBat
 from services.robot_io.vive import ViveTracker, open_vive
+from services.robot_io.vive_child import ViveChild
 from services.robot_io.vive_config import ViveConfig
-from services.robot_io.vive_device import SteamVrError
-from services.robot_io.vive_source import PollThread
 from shared.bus.memory import MemoryHub
 from shared.clock import SystemClock
+from shared.errors import RobotFault
 from shared.messages.topics import TRACKER_RAW
 from shared.testing.fake_vive.runtime import FakeVive
 from tests.integration.vive.conftest import SERIAL
@@ -69,10 +71,9 @@ def at(x: float, y: float = 0.0, z: float = 1.0) -> np.ndarray:
 def test_poses_come_250_times_a_second_and_make_a_bat(vive: FakeVive, watched: Watched):
     vive.put(2, SERIAL, at(0.3), battery=0.42)
     watched.until(lambda: watched.last.is_valid)
-    watched.tracker.rates()
-    watched.until(lambda: len(watched.seen) > 150)
+    watched.until(lambda: watched.tracker.rates()["tracker_polls_per_s"] > 220.0, 20.0)
     rates, counters = watched.tracker.rates(), watched.tracker.counters()
-    assert rates["tracker_polls_per_s"] == pytest.approx(250.0, rel=0.2)
+    assert rates["tracker_polls_per_s"] < 260.0
     assert rates["tracker_battery_percent"] == pytest.approx(42.0)
     assert rates["tracker_connected"] == 1.0
     assert watched.last.state[:3] == pytest.approx([0.3, 0.0, 1.0 + GRIP])
@@ -87,19 +88,20 @@ def test_a_bat_that_moves_has_its_speed(vive: FakeVive, watched: Watched):
     def move() -> None:
         began = time.monotonic()
         while not stop.wait(0.001):
-            passed = time.monotonic() - began
-            vive.put(2, SERIAL, at(0.5 * np.sin(passed)))
+            vive.put(2, SERIAL, at(0.4 * (time.monotonic() - began) - 2.0))
+
+    def has_speed() -> bool:
+        lately = watched.seen[-30:]
+        speeds = [bat.state[7] for bat in lately if bat.is_valid]
+        return len(speeds) == 30 and bool(np.abs(np.median(speeds) - 0.4) < 0.05)
 
     mover = threading.Thread(target=move)
     mover.start()
     try:
-        watched.until(lambda: watched.last.is_valid)
-        watched.until(lambda: len(watched.seen) > 60)
+        watched.until(has_speed, 9.0)
     finally:
         stop.set()
         mover.join()
-    speeds = np.array([bat.state[7] for bat in watched.seen[40:]])
-    assert np.median(speeds) == pytest.approx(0.45, abs=0.08)
 
 
 def test_a_dropout_is_lost_in_a_tenth_of_a_second_and_proven_again_in_a_fifth(
@@ -201,53 +203,52 @@ def test_steamvr_that_ends_is_joined_again_when_it_is_back(vive: FakeVive, watch
 def test_a_steamvr_that_never_will_do_is_refused_at_once(vive: FakeVive, tmp_path: Path):
     vive.age()
     clock = SystemClock()
-    with pytest.raises(SteamVrError, match="update SteamVR"):
+    with pytest.raises(RobotFault, match="update SteamVR"):
         open_vive(ViveConfig(serial=SERIAL), IDENTITY, IDENTITY, MemoryHub(clock).join("r"), clock)
     assert not any(thread.name == "vive" for thread in threading.enumerate())
 
 
-def test_the_loop_never_waits_for_steamvr():
-    class Stuck:
-        """A SteamVR that does not answer for a while, then crashes."""
+def child_of(watched: Watched) -> "subprocess.Popen[bytes]":
+    source = watched.tracker._source
+    assert isinstance(source, ViveChild)
+    assert source._child is not None
+    return source._child
 
-        is_stuck = False
 
-        def open(self) -> str:
-            return "1"
+def until_stopped(pid: int) -> None:
+    stat = Path(f"/proc/{pid}/stat")
+    until = time.monotonic() + 5.0
+    while stat.read_text().rpartition(")")[2].split()[0] != "T":
+        assert time.monotonic() < until
+        time.sleep(0.001)
 
-        def find(self, serial: str) -> bool:
-            return True
 
-        def seen(self) -> tuple[str, ...]:
-            return ()
+def test_a_steamvr_that_hangs_holds_up_nobody_and_its_process_is_replaced_when_it_crashes(
+    vive: FakeVive, watched: Watched
+):
+    vive.put(2, SERIAL, at(0.3))
+    watched.until(lambda: watched.last.is_valid)
+    watched.until(lambda: watched.tracker.counters()["tracker_polls"] > 10)
+    watched.longest = 0.0
+    child = child_of(watched)
+    child.send_signal(signal.SIGSTOP)
+    assert watched.until(lambda: not watched.last.is_valid) < 0.2
+    assert watched.last.problem == "no pose of the tracker arrives: restart SteamVR"
+    assert watched.longest < 0.05
+    before = watched.tracker.counters()
+    child.kill()
+    watched.until(lambda: "has ended" in watched.last.problem)
+    watched.until(lambda: watched.last.is_valid, 10.0)
+    after = watched.tracker.counters()
+    assert after["tracker_restarts"] == 1
+    assert after["tracker_polls"] >= before["tracker_polls"] > 10
+    assert child_of(watched).pid != child.pid
 
-        def poll(self):
-            self.is_stuck = True
-            time.sleep(0.5)
-            raise OSError("gone")
 
-        def battery(self) -> float | None:
-            return None
-
-        def is_ending(self) -> bool:
-            return False
-
-        def close(self) -> None: ...
-
-    from services.robot_io.vive_source import ViveSource
-
-    clock = SystemClock()
-    device = Stuck()
-    source = ViveSource(device, SERIAL, clock)
-    thread = PollThread(source)
-    bus = MemoryHub(clock).join("robot-io-0")
-    cfg = ViveConfig(serial=SERIAL, calibration="none")
-    tracker = ViveTracker(cfg, source, IDENTITY, IDENTITY, bus, clock, thread)
-    try:
-        watched = Watched(tracker)
-        watched.until(lambda: device.is_stuck)
-        watched.until(lambda: "crashed" in watched.last.problem)
-        assert watched.longest < 0.1
-        assert not any(bat.is_valid for bat in watched.seen)
-    finally:
-        tracker.close()
+def test_its_process_ends_with_the_tracker_even_while_it_is_stuck(vive: FakeVive, watched: Watched):
+    watched.until(lambda: watched.last.is_valid)
+    child = child_of(watched)
+    child.send_signal(signal.SIGSTOP)
+    until_stopped(child.pid)
+    watched.tracker.close()
+    assert child.wait(5.0) == -signal.SIGKILL
