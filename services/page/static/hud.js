@@ -149,12 +149,12 @@ export class Hud {
     const left = Math.ceil(frame?.left ?? 0);
     if (!frame || !mode || frame.missing.length) return ["", "…", ""];
     if (step === "countdown") return ["", "En garde …", "Your bat may already move."];
+    if (mode === "tripped") return ["reset", "Reset the safety stop", `Stopped: ${frame.gate.reason}. Look why before you reset.`];
+    if (mode === "disarmed") return ["arm", "Arm the robot", "Arming lets the robot move. It goes slowly at first, and holds still without a bout."];
     if (step === "bout" && referee?.phase === "paused") {
       return ["resume", "Go on", referee.reason ? `Paused: ${referee.reason}.` : "Paused."];
     }
     if (step === "bout") return ["pause", "Pause", ""];
-    if (mode === "tripped") return ["reset", "Reset the safety stop", `Stopped: ${frame.gate.reason}. Look why before you reset.`];
-    if (mode === "disarmed") return ["arm", "Arm the robot", "Arming lets the robot move. It goes slowly at first, and holds still without a bout."];
     if (mode === "ramping") return ["", "The robot wakes up …", ""];
     if (this.hello?.pointer && frame.is_lost) return ["", "Start the bout", "Move the mouse over the scene to take your bat."];
     if (step === "rest") return ["start", "Rematch", `Well fenced. Rest for ${left} s, or go on at once.`];
@@ -169,7 +169,7 @@ export class Hud {
     put("primary", label);
     primary.hidden = action === "pause";
     put("advice", advice);
-    $("pause").hidden = action !== "pause";
+    $("pause").hidden = referee?.phase !== "running";
     $("abandon").hidden = !(isOn || step === "countdown");
     $("choice").disabled = isOn || step === "countdown";
   }

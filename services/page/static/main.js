@@ -111,7 +111,8 @@ function onKey(event) {
   if (event.repeat || event.ctrlKey || event.metaKey || event.target instanceof HTMLSelectElement) return;
   if (key === " " && !(event.target instanceof HTMLButtonElement)) {
     event.preventDefault();
-    if (["start", "pause", "resume"].includes(page.action)) act(page.action); // arming takes a click
+    if (!$("pause").hidden) act("pause");
+    else if (["start", "resume"].includes(page.action)) act(page.action); // arming takes a click
   } else if (key === "escape" && !$("abandon").hidden) act("abandon");
   else if (key === "m") toggleSound();
   else if (key === "v") page.view = page.view === "player" ? "audience" : "player";

@@ -166,7 +166,7 @@ def test_a_bout_is_abandoned_and_the_page_says_void(site: LiveSite, player: Play
         return states[-1].phase
 
     player.until(lambda: phase() == "void")
-    player.until(lambda: "void: abandon by a person" in player.page.inner_text("#advice"))
+    player.until(lambda: "abandon by a person" in player.read("frame().referee.reason"))
     player.until(lambda: player.read("frame().step") == "idle")
 
 
