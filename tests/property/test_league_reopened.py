@@ -29,6 +29,8 @@ from shared.messages.training import AGENTS
 from shared.styles.bouts import BoutTable
 from tests.unit.league.driving import Match, snapshot
 
+pytestmark = pytest.mark.timeout(300)  # many commits, each of them synced
+
 POINTS = 24
 WAL_SALT = slice(16, 24)
 """Bytes of a write-ahead log's header that change when it is begun anew."""
@@ -122,7 +124,7 @@ def through(match: Match, copies: Path, wanted: int) -> list[Instant]:
         state = match.league.state
         if after != before and (state.is_tournament or (state.stages[-1:] and _in_rounds(state))):
             copy = copies / str(len(found))
-            shutil.copytree(match.folder, copy, ignore=shutil.ignore_patterns("*.lock", "*-shm"))
+            shutil.copytree(match.folder, copy, ignore=shutil.ignore_patterns("*.lock"))
             found.append(Instant(copy, *after, *before))
         before = after
     assert log.read_bytes()[WAL_SALT] == salt  # or sizes of the log would mean nothing
@@ -191,6 +193,8 @@ def check(folder: Path, match: Match) -> None:
             if number % 4 == 3 and size > instant.log_bytes_before:  # written, but not as meant
                 torn[instant.log_bytes_before] ^= 0xFF
             log.write_bytes(torn)
+            if number % 8 < 4:  # its index is a cache, and may be lost too
+                instant.folder.joinpath("league.sqlite-shm").unlink()
         # What reads it before any league does sees the same.
         assert RunState.fold(events_of(instant.folder)) == RunState.fold(entries[:position])
         other = Match(instant.folder, match.cfg, seed=match.seed)

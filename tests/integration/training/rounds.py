@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from services.jobs.draws import replay
+from services.league.events import BoutsPlayed
 from services.league.ledger import open_read_only
 from services.league.rounds import Turn, rounds_stages
 from shared.messages.training import AGENTS
@@ -14,7 +15,8 @@ from shared.policy.snapshot import unpack
 def assert_rounds_are_whole(folder: Path, rounds: int, iterations: int, updates: int) -> None:
     """Every turn was taken once, in order, with its updates, against whom the sampler draws."""
     with open_read_only(folder / "league.sqlite") as ledger:
-        state, draws = replay(ledger.replay())
+        entries = list(ledger.replay())
+    state, draws = replay(entries)
     assert state.finished
     assert [number for number, _, _ in state.library()] == list(range(1, rounds + 1))
     expected = [
@@ -30,6 +32,13 @@ def assert_rounds_are_whole(folder: Path, rounds: int, iterations: int, updates:
     assert len(draws) == len(records)
     assert all(draw.is_replayed for draw in draws)
     assert state.repeated_rollouts == 0
+    played = [e.event for e in entries if isinstance(e.event, BoutsPlayed) and e.event.stage >= 0]
+    assert any(state.stages[bouts.stage].stage.round for bouts in played)
+    for bouts in played:  # one opponent from start to end: its stage's
+        stage = state.stages[bouts.stage].stage
+        met = bouts.protagonist if stage.agent == "antagonist" else bouts.antagonist
+        assert met == stage.opponent
+        assert state.leases[bouts.lease].grant.stage == bouts.stage
     warm = dict(zip(AGENTS, state.warm_start() or (), strict=True))
     for number in range(1, rounds + 1):
         first = rounds_stages(state, number)[: len(AGENTS)]

@@ -8,7 +8,14 @@ import pytest
 from numpy.typing import NDArray
 
 from shared.game.geometry import BatShape
-from shared.policy.players import SCRIPTED_PLAYERS, RememberingPlayer, scripted_player
+from shared.policy.players import (
+    SCRIPTED_ANTAGONISTS,
+    SCRIPTED_PLAYERS,
+    SCRIPTED_PROTAGONISTS,
+    RememberingPlayer,
+    scripted_player,
+    scripted_role,
+)
 from shared.policy.scripted.blades import unit
 from shared.policy.scripted.heuristic import Heuristic, closest_share
 from shared.policy.scripted.memory import Memory
@@ -22,6 +29,16 @@ Float32s = NDArray[np.float32]
 ALL = sorted(SCRIPTED_PLAYERS)
 WITH_CHANCE = [name for name in ALL if name not in ("static", "guard")]
 FAR: Floats = np.array([3.0, 3.0, 3.0])
+
+
+def test_every_scripted_player_is_for_one_side():
+    assert not SCRIPTED_ANTAGONISTS.keys() & SCRIPTED_PROTAGONISTS.keys()
+    assert SCRIPTED_PLAYERS.keys() == SCRIPTED_ANTAGONISTS.keys() | SCRIPTED_PROTAGONISTS.keys()
+    roles = {name: scripted_role(name) for name in ALL}
+    assert [name for name in ALL if roles[name] == "antagonist"] == sorted(SCRIPTED_ANTAGONISTS)
+    for name in ALL:  # who attacks is named after it, or is a person
+        attacks = name in ("stab", "slash") or name.startswith("person-")
+        assert roles[name] == ("antagonist" if attacks else "protagonist")
 
 
 def observation(
