@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from services.robot_io.__main__ import build
 from services.robot_io.frames import IDENTITY
 from services.robot_io.trackers import TrackedBat
 from services.robot_io.vive import ViveTracker, open_vive
@@ -19,7 +20,8 @@ from shared.bus.memory import MemoryHub
 from shared.clock import SystemClock
 from shared.errors import RobotFault
 from shared.messages.topics import TRACKER_RAW
-from shared.testing.fake_vive.runtime import FakeVive
+from shared.runtime.serve import ServeArgs
+from shared.testing.fake_vive.runtime import OVERRIDE, FakeVive
 from tests.integration.vive.conftest import SERIAL
 from tests.unit.calibration.making import calibration, write
 
@@ -252,3 +254,18 @@ def test_its_process_ends_with_the_tracker_even_while_it_is_stuck(vive: FakeVive
     until_stopped(child.pid)
     watched.tracker.close()
     assert child.wait(5.0) == -signal.SIGKILL
+
+
+def test_a_site_that_wants_a_tracker_on_a_machine_without_steamvr_is_refused_in_one_line(
+    vive: FakeVive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv(OVERRIDE, str(tmp_path / "nothing"))
+    clock = SystemClock()
+    args = ServeArgs(
+        role="robot-io", site=None, name="robot-io-0", run=tmp_path, run_id="r",
+        overrides=("robot_io.tracker=vive", "vive.serial=LHR-1"),
+    )  # fmt: skip
+    with pytest.raises(RobotFault) as caught:
+        build(args, MemoryHub(clock).join("robot-io-0"), clock)
+    assert str(caught.value).startswith("SteamVR is not installed for this user (openvr error 110")
+    assert "\n" not in str(caught.value)
