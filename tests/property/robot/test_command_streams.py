@@ -16,7 +16,7 @@ from tests.property.robot.streams import (
 )
 
 STREAMS = 100_000
-QUICK = 1_500
+QUICK = 1_000
 STREAMS_PER_GATE = 50
 
 
