@@ -140,14 +140,19 @@ class TorqueLimiter:
             qd: float64[7] (rad/s).
         """
         fast, strong = self._velocity, self.effort
-        fastest = np.clip(-self._k_position * (q - self._upper), -fast, fast)
-        slowest = np.clip(-self._k_position * (q - self._lower), -fast, fast)
+        fastest = _within(self._k_position * (self._upper - q), fast)
+        slowest = _within(self._k_position * (self._lower - q), fast)
         return (
-            np.clip(-self._k_velocity * (qd - slowest), -strong, strong),
-            np.clip(-self._k_velocity * (qd - fastest), -strong, strong),
+            _within(self._k_velocity * (slowest - qd), strong),
+            _within(self._k_velocity * (fastest - qd), strong),
         )
 
     def limit(self, torques: Float64, q: Float64, qd: Float64) -> Float64:
         """Return what gets through of torques; what is not a number does, as on the robot."""
         low, high = self.limits(q, qd)
         return np.minimum(np.maximum(torques, low), high)
+
+
+def _within(values: Float64, most: Float64) -> Float64:
+    """Return values between minus and plus ``most``; np.clip takes three times as long."""
+    return np.minimum(np.maximum(values, -most), most)

@@ -6,6 +6,7 @@ force, and the force into torques by the transposed Jacobian. With its habits: i
 position, numbers or not; it keeps its last command for ever; starting it anew forgets that.
 """
 
+import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -102,6 +103,7 @@ class JtCartesian:
         self._delay = delay
         self._feedforward = _by_joint(parameters.joint_feedforward, joints)
         self._saturation = _by_joint(parameters.saturation, joints)
+        self._is_saturated = bool((self._saturation > 0.0).any())
         self._commands: deque[tuple[float, Float64]] = deque(maxlen=QUEUED)
         self._desired = self._filtered = np.zeros(7)
         self._posture = np.zeros(JOINTS)
@@ -150,7 +152,7 @@ class JtCartesian:
         jacobian = arm.jacobian
         moving = jacobian @ self._velocity
         error = pose_error(arm.position, arm.rotation, self._filtered)
-        wanted = -(self.kp / self.kd) * error
+        wanted = -self.kp / self.kd * error
         wanted[:3] = _shortened(wanted[:3], cfg.vel_saturation_trans)
         wanted[3:] = _shortened(wanted[3:], cfg.vel_saturation_rot)
         self.force = force = self.kd * (wanted - moving)
@@ -186,8 +188,10 @@ class JtCartesian:
 
     def _scale(self, tau: Float64) -> float:
         """Return what all torques are multiplied by, so that none is over its saturation."""
+        if not self._is_saturated:
+            return 1.0
         scale = 1.0
-        for most, torque in zip(self._saturation, tau, strict=True):
+        for most, torque in zip(self._saturation.tolist(), tau.tolist(), strict=True):
             if most > 0.0 and abs(torque) > most:  # never true for NaN, which stays NaN
                 scale = min(scale, most / abs(torque))
         return scale
@@ -202,9 +206,9 @@ def pose_error(position: Float64, rotation: Float64, desired: Float64) -> Float6
     """Return float64[6], where a pose is as seen from the desired one (m, rad for small turns)."""
     aim = rotation_of(desired[3:])
     # Half the sum of the axes' cross products, desired first.
-    both = 0.5 * aim @ rotation.T
-    turn = both[(1, 2, 0), (2, 0, 1)] - both[(2, 0, 1), (1, 2, 0)]
-    return np.concatenate([position - desired[:3], turn])
+    (_, ab, ac), (ba, _, bc), (ca, cb, _) = (aim @ rotation.T).tolist()
+    x, y, z = (position - desired[:3]).tolist()
+    return np.array([x, y, z, 0.5 * (bc - cb), 0.5 * (ca - ac), 0.5 * (ab - ba)])
 
 
 def filtered(start: Float64, end: Float64, share: float) -> Float64:
@@ -214,10 +218,10 @@ def filtered(start: Float64, end: Float64, share: float) -> Float64:
     cosine = float(first @ second)
     if cosine < 0.0:
         second, cosine = -second, -cosine
-    angle = np.arctan2(np.linalg.norm(second - cosine * first), cosine)
+    angle = math.atan2(_length(second - cosine * first), cosine)
     if angle != 0.0:  # true for NaN
-        between = np.sin((1.0 - share) * angle) * first + np.sin(share * angle) * second
-        out[3:] = between / np.linalg.norm(between)
+        between = math.sin((1.0 - share) * angle) * first + math.sin(share * angle) * second
+        out[3:] = between / _length(between)
     else:
         out[3:] = first
     return out
@@ -265,8 +269,12 @@ def _by_joint(values: Mapping[str, float], joints: tuple[str, ...]) -> Float64:
 
 
 def _shortened(velocity: Float64, most: float) -> Float64:
-    size = float(np.linalg.norm(velocity))
+    size = _length(velocity)
     return velocity * (most / size) if most > 0.0 and size > most else velocity
+
+
+def _length(vector: Float64) -> float:
+    return math.sqrt(float(vector @ vector))
 
 
 def _nullspace(jacobian: Float64, damping: float) -> Float64:

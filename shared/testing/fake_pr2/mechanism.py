@@ -114,7 +114,7 @@ class Mechanism:
         self._was_halted = self.is_halted
         torques = np.zeros(JOINTS)
         for controller in self._running():
-            torques = torques + controller.update(arm, now)
+            torques += controller.update(arm, now)
         self.commanded = self._limiter.limit(torques, arm.q, arm.qd)
         # A current that is not a number is an int16 of 0; a motor without power gives nothing.
         reached = np.where(np.isfinite(self.commanded), self.commanded, 0.0)

@@ -10,7 +10,7 @@ from shared.sim.arm import Float64
 from shared.sim.parameters import load_parameters
 from shared.sim.torque_arm import TorqueArm
 from shared.testing.fake_pr2.config import ROOT, FakePr2Config
-from shared.testing.fake_pr2.jt_cartesian import JtState
+from shared.testing.fake_pr2.jt_cartesian import JtCartesian, JtState
 from shared.testing.fake_pr2.mechanism import JointStatistics, Mechanism
 from shared.testing.fake_pr2.power import SAMPLE_SECONDS, Power, PowerState
 
@@ -92,9 +92,8 @@ class Robot:
         mechanism.cycle()
         cycle = mechanism.cycles
         for name, controller in mechanism.controllers.items():
-            found = mechanism.jt(name)
-            if controller.is_running and found is not None and found.is_due and found.state:
-                outlet.controller_state(name, found.state)
+            if controller.is_running and isinstance(controller, JtCartesian):
+                self._publish(name, controller)
         if cycle % 10 == 0:
             outlet.joint_states(self.joints())
         if cycle % round(1000 * SAMPLE_SECONDS) == 0:
@@ -151,6 +150,10 @@ class Robot:
     def reset_motors(self) -> None:
         """Bring the motors back, where they have power."""
         self.power.reset(self.mechanism.now)
+
+    def _publish(self, name: str, controller: JtCartesian) -> None:
+        if controller.is_due and controller.state is not None:
+            self._outlet.controller_state(name, controller.state)
 
     def _say_slow_things(self) -> None:
         mechanism, power = self.mechanism, self.power
