@@ -28,7 +28,7 @@ WORD = struct.Struct("<d")
 REPORT_SECONDS = 0.25
 FORGET_SECONDS = 0.5
 """A tone that nobody has confirmed for so long ends."""
-SILENT_SECONDS = 1.5
+SILENT_SECONDS = 3.0
 """A stream that has not asked for samples for so long is dead."""
 UNDERRUNS = 4
 COUNT_SECONDS = 10.0

@@ -104,13 +104,14 @@ def devices() -> Iterator[Devices]:
 @pytest.mark.parametrize("hz", [440.0, 300.0])
 def test_a_tone_of_the_referee_is_heard_at_its_pitch_without_clicks(devices: Devices, hz: float):
     """On a machine too busy for sound it is tried again; its late blocks are counted."""
-    late = devices.room.fresh_status().counters["tone_underruns"]
+    before = devices.room.fresh_status().counters
     for _ in range(TRIES):
         heard = devices.hear(hz)
         if heard.is_clean(hz) and max(heard.on_after, heard.off_after) < MOST_LATE:
             break
     else:
-        if devices.room.fresh_status().counters["tone_underruns"] > late:
+        after = devices.room.fresh_status().counters
+        if any(after[name] > before[name] for name in ("tone_underruns", "ticks_lost")):
             pytest.skip(f"this machine was too busy for sound {TRIES} times")
     assert heard.is_clean(hz)
     assert -0.02 < heard.on_after < MOST_LATE
@@ -223,6 +224,9 @@ def test_without_bluetooth_and_with_a_broken_sound_library_the_loop_goes_on_and_
             )
         )
         first = it.fresh_status()
-        last = it.fresh_status()
-        assert last.counters["ticks"] > first.counters["ticks"] + 10
-        assert "\n" not in last.last_error
+        assert "\n" not in first.last_error
+        it.until(
+            lambda: (
+                it.status is not None and it.status.counters["ticks"] > first.counters["ticks"] + 10
+            )
+        )
