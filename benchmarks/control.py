@@ -38,6 +38,7 @@ from shared.messages.live import ServiceStatus
 from shared.messages.play import BatStates, GateRequest, GateState
 from shared.messages.topics import ARM, BATS, GATE, STATUS
 from shared.messages.wire import encode
+from shared.runtime.logging import configure_logging
 
 QUESTION = "bat states read to command sent, 100 a second, while a training run has the other core"
 GOAL = 0.01
@@ -294,6 +295,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=SECONDS, help="(%(default)g)")
     parser.add_argument("--json", action="store_true", help="one JSON object")
     found = parser.parse_args()
+    configure_logging(None)
     report = report_of("control", lambda: measurement(watched(found.seconds)), smoke=False)
     print(json.dumps(report) if found.json else text_of(report))
 
