@@ -27,6 +27,10 @@ def main(argv: Sequence[str] | None = None, lines: Iterable[str] | None = None) 
         "--no-auto-restart", action="store_true",
         help="nothing resets the motors after a released run stop",
     )  # fmt: skip
+    parser.add_argument(
+        "--set-up", action="store_true",
+        help="set up r_cart as docs/robot.md says, so that robot_io can be armed",
+    )  # fmt: skip
     args = parser.parse_args(argv)
     try:
         fake = FakePr2(FakePr2Config(port=args.port, auto_restart=not args.no_auto_restart))
@@ -34,6 +38,8 @@ def main(argv: Sequence[str] | None = None, lines: Iterable[str] | None = None) 
         sys.stderr.write(f"{error}\n")
         return 2
     with fake:
+        if args.set_up:
+            fake.set_up()
         _say(f"ROS_MASTER_URI={fake.master_uri}")
         try:
             _listen(fake, sys.stdin if lines is None else lines)

@@ -13,6 +13,7 @@ from typing import Any, Final, cast
 import numpy as np
 
 from shared.clock import Clock, SystemClock
+from shared.errors import RobotFault
 from shared.ros import types
 from shared.ros.node import Node
 from shared.sim.arm import Float64
@@ -195,6 +196,24 @@ class FakePr2:
         cart = self._node.param(f"/{self.cfg.prefix}cart", {})
         self._node.set_param(f"/{name}", cart)
         return self.load(name) and self.switch([name], [])
+
+    def set_up(self) -> None:
+        """Do what docs/robot.md says is to be done on the robot after its start.
+
+        Half the force, torques bounded, and the Cartesian controller in the place of the one that
+        holds the arm.
+
+        Raises:
+            RobotFault: the Cartesian controller is loaded already.
+        """
+        prefix = self.cfg.prefix
+        cart = f"{prefix}cart"
+        arm = self._robot.mechanism.arm.arm
+        most = {f"{prefix}{joint.name}_joint": joint.continuous_torque for joint in arm.joints}
+        self._node.set_param(f"/{cart}/vel_saturation_trans", 1.0)
+        self._node.set_param(f"/{cart}/saturation", most)
+        if not (self.load(cart) and self.switch([cart], [f"{prefix}arm_controller"])):
+            raise RobotFault(f"the fake PR2 could not start {cart}: is it loaded already?")
 
     def set_param(self, name: str, value: Any) -> None:
         """Set a parameter on the master."""

@@ -22,7 +22,6 @@ from shared.bus.zenoh import open_zenoh
 from shared.clock import SystemClock
 from shared.messages.play import BatStates, GateReply, GateRequest, GateState, TrackerPose
 from shared.messages.topics import ARM, BATS, GATE, STATUS, TRACKER
-from shared.sim.arm import load_arm
 from shared.testing.fake_pr2.fake import FakePr2
 from shared.testing.ros_master import has_ros_master
 
@@ -226,13 +225,8 @@ class Stand:
 
 
 def started_fake() -> FakePr2:
-    """A fake PR2 set up as docs/robot.md says: half the force, torques bounded, r_cart running."""
     fake = FakePr2()
-    fake.set_param("/r_cart/vel_saturation_trans", 1.0)
-    for joint in load_arm("right").joints:
-        fake.set_param(f"/r_cart/saturation/r_{joint.name}_joint", joint.continuous_torque)
-    assert fake.load("r_cart")
-    assert fake.switch(["r_cart"], ["r_arm_controller"])
+    fake.set_up()
     return fake
 
 

@@ -28,7 +28,6 @@ from shared.messages.play import (
     TrackerPose,
 )
 from shared.messages.topics import ARM, BATS, GATE, OFFSET, TRACKER
-from shared.sim.arm import load_arm
 from shared.sim.config import SimConfig
 from shared.testing.fake_pr2.fake import FakePr2
 
@@ -266,13 +265,8 @@ class Lockstep:
 
 
 def driven_fake(clock: ManualClock) -> FakePr2:
-    """A fake PR2 set up as docs/robot.md says: half the force, torques bounded, r_cart running."""
     fake = FakePr2(clock=clock, is_driven=True)
-    fake.set_param("/r_cart/vel_saturation_trans", 1.0)
-    for joint in load_arm("right").joints:
-        fake.set_param(f"/r_cart/saturation/r_{joint.name}_joint", joint.continuous_torque)
-    assert fake.load("r_cart")
-    assert fake.switch(["r_cart"], ["r_arm_controller"])
+    fake.set_up()
     return fake
 
 

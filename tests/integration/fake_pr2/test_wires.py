@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from shared.errors import RobotFault
 from shared.ros import types
 from shared.ros.node import Node
 from shared.testing.fake_pr2.__main__ import main
@@ -222,10 +223,11 @@ def test_what_is_not_published_any_more_stays_away(lab: Lab):
 
 
 def test_by_hand_it_says_where_its_master_is(capsys: pytest.CaptureFixture[str]):
-    assert main(["--port", "0"], ["status\n", "dance\n", "quit\n"]) == 0
+    assert main(["--port", "0", "--set-up"], ["status\n", "dance\n", "quit\n"]) == 0
     out = capsys.readouterr().out
     assert "ROS_MASTER_URI=http://127.0.0.1:" in out
-    assert "motors on, running: r_arm_controller" in out
+    assert "motors on, running: l_arm_controller" in out
+    assert "r_cart" in out
     assert "dance is not known" in out
 
 
@@ -242,3 +244,12 @@ def test_a_port_that_is_taken_is_one_line(capsys: pytest.CaptureFixture[str]):
 def test_settings_out_of_range_are_refused(bad: dict[str, float]):
     with pytest.raises(ValueError, match="allowed are"):
         FakePr2Config(**bad)  # type: ignore[arg-type]
+
+
+def test_a_robot_is_set_up_once(lab: Lab):
+    lab.fake.set_up()
+    assert "r_cart" in lab.fake.running()
+    assert "r_arm_controller" not in lab.fake.running()
+    assert lab.node.param("/r_cart/saturation/r_wrist_flex_joint") == 5.568
+    with pytest.raises(RobotFault, match="loaded already"):
+        lab.fake.set_up()
