@@ -24,7 +24,6 @@ from shared.sim.config import SimConfig
 from shared.telemetry.archive import INFO_FILE, archived_bouts, load_bout, read_info
 from shared.telemetry.live import SERIES
 from shared.telemetry.rrd import recordings
-from shared.telemetry.streams import BY_NAME
 from tests.integration.robot_io.site import Site
 
 STEPS = 300
@@ -148,9 +147,13 @@ def test_bouts_between_processes_are_recorded_and_one_outlives_its_recorder(matc
         scores = recount(bout, rules, bat_of(sim), target_of(sim))
         assert scores.score[0] == bout.info.score, name
         assert scores.step[0] == bout.info.steps
-        for stream in ("bats", "arms", "robot", "gate", "protagonist_offsets"):
-            rows = bout.streams[stream]
-            assert len(rows) > 2.0 * BY_NAME[stream].rate_hz, (name, stream)
+        for stream in ("bats", "arms", "robot", "gate"):
+            counts = bout.info.streams[stream]
+            whole = len(bout.streams[stream]) + counts.missing  # a busy machine loses ticks
+            seconds = np.ptp(bout.seconds(stream))
+            assert whole / seconds == pytest.approx(100.0, rel=0.03), (name, stream)
+            assert counts.rate_hz > 80.0
+        assert len(bout.streams["protagonist_offsets"]) > 50
     bout = load_bout(path)
     assert {name: getattr(bout.info, name) for name in COUNTERS} == verdict
     assert bout.info.steps == STEPS
@@ -159,19 +162,21 @@ def test_bouts_between_processes_are_recorded_and_one_outlives_its_recorder(matc
 
     first, *others = recordings(match.folder)
     assert others  # the second recorder wrote its own file
-    found: dict[str, list[float]] = defaultdict(list)
+    found: dict[str, list[int]] = defaultdict(list)
     for chunk in RrdReader(first).stream():
         if not chunk.is_static:
             times = chunk.to_record_batch().column("wall_time").cast("int64").to_pylist()
-            found[chunk.entity_path.removeprefix("/")] += [1e-9 * when for when in times]
-    begin, end = 1e-9 * bout.info.started_at_ns, 1e-9 * bout.info.started_at_ns + 0.01 * STEPS
-    heard = {name for name, rows in bout.streams.items() if len(rows)}
+            found[chunk.entity_path.removeprefix("/")] += times
+    begin, end = bout.info.started_at_ns, bout.info.started_at_ns + 10_000_000 * STEPS
+    drawn = 0
     for series in SERIES:
-        rate = BY_NAME[series.stream].rate_hz
-        if series.stream not in heard or rate < 100.0:
+        if (rows := bout.streams.get(series.stream)) is None or series.stream == "heart_rate":
             continue
-        inside = [when for when in found[series.path] if begin <= when <= end]
-        assert len(inside) == pytest.approx(STEPS, rel=0.05), series.path
+        archived = [when for when in rows["t_ns"].tolist() if begin <= when <= end]
+        assert sorted(w for w in found[series.path] if begin <= w <= end) == sorted(archived)
+        assert len(archived) > 100
+        drawn += 1
+    assert drawn >= 28
     assert found["bout/scene/poses"]
     assert found["services/cpu_percent/robot-io-0"]
 
