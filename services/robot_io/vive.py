@@ -23,6 +23,8 @@ from shared.messages.tracking import TrackerRaw
 FLOWN_M = 4.0
 """A bat further than this from the target is not where it seems: an occluded tracker goes on by
 dead reckoning, and flies off."""
+HUNG_SECONDS = 1.0
+"""Without a word of SteamVR for so long, it hangs."""
 DROPOUT_SECONDS = 0.2
 """After a dropout longer than this the place of the tracker is to be checked in its dock."""
 
@@ -147,7 +149,7 @@ class ViveTracker:
             return self._uncalibrated
         if self._dock.problem:
             return self._dock.problem
-        if self._seen_at is None or now - self._seen_at > LOST_SECONDS:
+        if self._seen_at is None or now - self._seen_at > HUNG_SECONDS:
             return "no pose of the tracker arrives: restart SteamVR"
         return ""
 

@@ -235,6 +235,7 @@ def test_a_steamvr_that_hangs_holds_up_nobody_and_its_process_is_replaced_when_i
     child = child_of(watched)
     child.send_signal(signal.SIGSTOP)
     assert watched.until(lambda: not watched.last.is_valid) < 0.2
+    watched.until(lambda: bool(watched.last.problem))
     assert watched.last.problem == "no pose of the tracker arrives: restart SteamVR"
     assert watched.longest < 0.05
     before = watched.tracker.counters()
