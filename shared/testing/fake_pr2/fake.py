@@ -14,17 +14,17 @@ import numpy as np
 
 from shared.clock import Clock, SystemClock
 from shared.errors import RobotFault
-from shared.ros import types
 from shared.ros.node import Node
 from shared.sim.arm import Float64
 from shared.sim.servo import CYCLE
 from shared.testing.fake_pr2.config import FakePr2Config, shipped_parameters
 from shared.testing.fake_pr2.jt_cartesian import JtCartesian, pose_of
+from shared.testing.fake_pr2.power import CIRCUITS
 from shared.testing.fake_pr2.robot import Robot
 from shared.testing.fake_pr2.ros_side import Wires, pose_in
+from shared.testing.fake_pr2.serving import NODE, serve
 from shared.testing.ros_master import RosMaster
 
-NODE: Final = "/pr2_ethercat"
 MOST_CYCLES: Final = 20
 """Made up for without letting anybody else in."""
 MOST_BEHIND: Final = 200
@@ -104,7 +104,7 @@ class FakePr2:
             for name in self.cfg.running:
                 if self.load(name):
                     self.switch([name], [])
-            self._serve()
+            serve(self._node, self)
             self._node.wait_registered(5.0)
             undo.pop_all()
         self._thread = threading.Thread(target=self._run, name="fake-pr2", daemon=True)
@@ -191,6 +191,28 @@ class FakePr2:
         with self._lock:
             return self._robot.switch(start, stop, strictness)
 
+    def unload(self, name: str) -> bool:
+        """Unload a controller; False where there is none, or it runs."""
+        with self._lock:
+            return self._robot.mechanism.unload(name)
+
+    def controllers(self) -> dict[str, bool]:
+        """Return the names of the controllers that are loaded, and whether each runs."""
+        with self._lock:
+            found = self._robot.mechanism.controllers
+            return {name: controller.is_running for name, controller in found.items()}
+
+    def set_circuit(self, circuit: int, *, is_on: bool) -> bool:
+        """Give the power to a circuit, or take it; False where that cannot be."""
+        with self._lock:
+            power = self._robot.power
+            if not 0 <= circuit < CIRCUITS:
+                return False
+            if is_on:
+                return power.start_circuit(circuit, self._robot.mechanism.now)
+            power.stop_circuit(circuit)
+            return True
+
     def add_rival(self, name: str) -> bool:
         """Load and start a second Cartesian controller on the arm, with the first one's numbers."""
         cart = self._node.param(f"/{self.cfg.prefix}cart", {})
@@ -221,8 +243,7 @@ class FakePr2:
 
     def running(self) -> tuple[str, ...]:
         """Return the names of the controllers that run."""
-        with self._lock:
-            return tuple(self._running())
+        return tuple(name for name, runs in self.controllers().items() if runs)
 
     @property
     def is_halted(self) -> bool:
@@ -337,59 +358,3 @@ class FakePr2:
         with self._lock:
             for name, value in pressed.items():
                 setattr(self._robot.power, name, value)
-
-    def _serve(self) -> None:
-        """Answer the services of the controller manager, the motors and the power board."""
-        manager, of_manager = "/pr2_controller_manager", "pr2_mechanism_msgs"
-        serve = self._node.serve
-        serve(f"{manager}/list_controllers", f"{of_manager}/ListControllers", self._list)
-        serve(f"{manager}/load_controller", f"{of_manager}/LoadController", self._load)
-        serve(f"{manager}/unload_controller", f"{of_manager}/UnloadController", self._unload)
-        serve(f"{manager}/switch_controller", f"{of_manager}/SwitchController", self._switch)
-        serve(f"{NODE}/halt_motors", "std_srvs/Empty", self._halt)
-        serve(f"{NODE}/reset_motors", "std_srvs/Empty", self._reset)
-        serve("/power_board/control", "pr2_power_board/PowerBoardCommand", self._control)
-
-    def _list(self, request: Any) -> Any:
-        del request
-        with self._lock:
-            found = self._robot.mechanism.controllers
-            states = ["running" if each.is_running else "stopped" for each in found.values()]
-            return types.new(
-                "pr2_mechanism_msgs/ListControllersResponse", controllers=list(found), state=states
-            )
-
-    def _load(self, request: Any) -> Any:
-        return types.new("pr2_mechanism_msgs/LoadControllerResponse", ok=self.load(request.name))
-
-    def _unload(self, request: Any) -> Any:
-        with self._lock:
-            done = self._robot.mechanism.unload(request.name)
-        return types.new("pr2_mechanism_msgs/UnloadControllerResponse", ok=done)
-
-    def _switch(self, request: Any) -> Any:
-        done = self.switch(
-            list(request.start_controllers), list(request.stop_controllers), request.strictness
-        )
-        return types.new("pr2_mechanism_msgs/SwitchControllerResponse", ok=done)
-
-    def _halt(self, request: Any) -> Any:
-        del request
-        self.halt_motors("service request")
-        return types.new("std_srvs/EmptyResponse")
-
-    def _reset(self, request: Any) -> Any:
-        del request
-        self.reset_motors()
-        return types.new("std_srvs/EmptyResponse")
-
-    def _control(self, request: Any) -> Any:
-        with self._lock:
-            power = self._robot.power
-            done = False
-            if 0 <= request.breaker_number < 3 and request.command == "start":
-                done = power.start_circuit(request.breaker_number, self._robot.mechanism.now)
-            elif 0 <= request.breaker_number < 3 and request.command in ("stop", "disable"):
-                power.stop_circuit(request.breaker_number)
-                done = True
-        return types.new("pr2_power_board/PowerBoardCommandResponse", retval=0 if done else -1)

@@ -84,7 +84,7 @@ class Lab:
         rotation.w, rotation.x, rotation.y, rotation.z = turn
         self._pose.publish(message)
 
-    def until(self, condition: Callable[[], bool], seconds: float = 10.0) -> None:
+    def until(self, condition: Callable[[], bool], seconds: float = 60.0) -> None:
         deadline = time.monotonic() + seconds
         while not condition():
             assert time.monotonic() < deadline, "not in time"
