@@ -32,7 +32,7 @@ from shared.clock import SystemClock
 from shared.errors import RiposteError
 from shared.runtime.files import RunLock, atomic_write, require_free_space
 from shared.runtime.logging import configure_logging
-from shared.runtime.serve import stop_on_signals
+from shared.runtime.serve import EXIT_BAD_INPUT, stop_on_signals
 
 FREE_BYTES = 256 << 20
 """A match needs this much disk to begin with."""
@@ -188,7 +188,8 @@ class Course:
                 exit_code=event.exit_code,
             )  # fmt: skip
             if event.kind == "gave_up":
-                raise RiposteError(f"{event.describe}\n{event.tail}".rstrip())
+                is_told = event.exit_code == EXIT_BAD_INPUT  # in one line, which is its last
+                raise RiposteError(event.describe if is_told else f"{event.describe}\n{event.tail}")
             screen.say(event.describe)
             if event.kind == "died":
                 self._deaths.append(event.describe)

@@ -15,7 +15,7 @@ from services.jobs.status import OPEN_SECONDS, read_endpoint
 from services.jobs.who import operator
 from shared.bus.base import Bus, NoAnswer, Refused
 from shared.clock import Clock, SystemClock
-from shared.errors import RiposteError
+from shared.errors import ConfigError, RiposteError
 from shared.messages.play import GateReply, GateRequest
 from shared.messages.topics import ARM
 from shared.runtime.serve import ServeArgs, open_site_bus, run_id_of
@@ -86,7 +86,12 @@ def place(found: argparse.Namespace) -> ServeArgs:
         folder = PLAYED if (PLAYED / "endpoint.json").exists() else UP
     connect, run_id = tuple(found.connect), str(found.run_id)
     goes_on = (folder / "endpoint.json").exists()
-    if not connect and (goes_on or found.site is None):
+    if not connect and not goes_on and found.site is None:
+        raise ConfigError(
+            f"nothing goes on in {folder} (no endpoint.json): start riposte play, name its folder "
+            "with --run DIR, or name the site file that riposte up runs"
+        )
+    if not connect and goes_on:
         endpoint = read_endpoint(folder)
         connect, run_id = (endpoint.connect,), run_id or endpoint.run
     return ServeArgs(

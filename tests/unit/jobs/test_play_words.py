@@ -204,7 +204,7 @@ def test_a_match_that_goes_on_is_found_before_the_site(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ConfigError, match="no run in runs/latest"):
+    with pytest.raises(ConfigError, match="nothing goes on in runs/latest"):
         robot.main(["check"])
     folder = tmp_path / "runs" / "latest-play"
     folder.mkdir(parents=True)
