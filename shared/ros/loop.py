@@ -92,11 +92,13 @@ class SocketLoop:
         self._loop.run_forever()
 
     async def _cancel_all(self) -> None:
-        tasks = tuple(self._tasks)
+        # Not only those begun here: a server makes a task of each connection.
+        tasks = asyncio.all_tasks() - {asyncio.current_task()}
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
         await self._loop.shutdown_asyncgens()
+        await asyncio.sleep(0.0)  # transports that were closed let go of their sockets
 
     def _ended(self, task: asyncio.Task[Any]) -> None:
         self._tasks.discard(task)

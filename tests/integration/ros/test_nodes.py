@@ -1,6 +1,7 @@
 """What goes wrong between nodes: masters and publishers that go, other types, bytes of no sense."""
 
 import contextlib
+import gc
 import socket
 import threading
 import time
@@ -310,3 +311,18 @@ def test_a_closed_node_leaves_no_thread(master: Master) -> None:
     assert 1 <= len(ours) <= 5
     node.close()
     eventually(lambda: not [one for one in threading.enumerate() if "short" in one.name])
+
+
+def test_a_node_that_closes_lets_go_of_those_who_are_just_asking_it(master: Master) -> None:
+    node = Node("/asked", master.uri, "127.0.0.1")
+    place = place_of(node.uri)
+    asking = [socket.create_connection(place, 2.0) for _ in range(3)]
+    asking[0].sendall(b"POST /RPC2 HTTP/1.1\r\n")  # and nothing more
+    time.sleep(0.1)
+    node.close()
+    gc.collect()  # an unfinished task would be an error of this test
+    for one in asking:
+        one.settimeout(2.0)
+        with contextlib.suppress(ConnectionResetError):
+            assert one.recv(1) == b""
+        one.close()
