@@ -17,7 +17,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -95,18 +95,19 @@ class Site:
         self._match_at = now + 0.1
         self.match.tick()
         self.match.take_events()
-        if self.match.gate is not None and self.match.gate.mode == "tripped":
-            self._arm_again()
+        mode = "" if self.match.gate is None else self.match.gate.mode
+        if mode == "tripped":
+            self.trips += 1
+            self._ask_gate("reset")
+        if mode == "tripped" or (self.trips and mode == "disarmed"):
+            self._ask_gate("arm")  # refused while it still moves: asked again
         for event in self._supervisor.poll():
             raise RiposteError(f"{event.describe}\n{event.tail}")
 
-    def _arm_again(self) -> None:
-        self.trips += 1
-        for action in ("reset", "arm"):
-            asked = GateRequest(action=action, operator="bench")
-            pending = self.bus.ask(ARM, asked, 1.0)
-            while pending.take() is None:
-                self.bus.wait(0.05)
+    def _ask_gate(self, action: Literal["arm", "reset"]) -> None:
+        pending = self.bus.ask(ARM, GateRequest(action=action, operator="bench"), 1.0)
+        while pending.take() is None:
+            self.bus.wait(0.05)
 
     def until_fencing(self) -> None:
         """Wait until a bout runs.
