@@ -37,10 +37,13 @@ class LiveSite:
         self.bats: list[BatStates] = []
         self.referee: list[RefereeState] = []
 
-    def service(self, module: str, *words: str) -> "subprocess.Popen[bytes]":
+    def service(
+        self, module: str, *words: str, stderr: int | None = None
+    ) -> "subprocess.Popen[bytes]":
         return self._start(
-            module, "-m", f"services.{module}", *self._run, "--connect", self.endpoint, *words
-        )
+            module, "-m", f"services.{module}", *self._run, "--connect", self.endpoint, *words,
+            stderr=stderr,
+        )  # fmt: skip
 
     def page(self, *overrides: str) -> str:
         """Start the page on a free port; return its address once it is served."""
@@ -55,8 +58,10 @@ class LiveSite:
         process.kill()
         process.wait()
 
-    def _start(self, name: str, *words: str) -> "subprocess.Popen[bytes]":
-        process = subprocess.Popen([sys.executable, *words], cwd=ROOT)
+    def _start(
+        self, name: str, *words: str, stderr: int | None = None
+    ) -> "subprocess.Popen[bytes]":
+        process = subprocess.Popen([sys.executable, *words], cwd=ROOT, stderr=stderr)
         self.processes[name] = process
         return process
 
