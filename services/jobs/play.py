@@ -155,8 +155,11 @@ class Course:
                     screen.tick()
                 shut = match.shut()
                 deadline = self._clock.now() + SHUT_SECONDS
-                while shut.take() is None and self._clock.now() < deadline:
+                while shut.take() is None or match.is_bout_on:
+                    if self._clock.now() >= deadline:
+                        break
                     bus.wait(TICK_SECONDS)
+                    match.hear()
                 screen.tick()
         self._ended = match.ended
         if match.ended:

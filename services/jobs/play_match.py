@@ -147,7 +147,7 @@ class Match:
     def tick(self) -> None:
         """Take what was said, ask for what comes next."""
         now = self._clock.now()
-        self._hear(now)
+        self.hear()
         if self._disarms:
             self._disarm(now)
         elif not self._was_armed:
@@ -163,10 +163,15 @@ class Match:
         self._stop_at = self._clock.now()
 
     def shut(self) -> Pending[GateReply]:
-        """Ask for the robot to be disarmed, at the end of the match."""
+        """Ask for the robot to be disarmed and a bout to be abandoned, at the end of the match."""
         self._was_armed = True  # nobody arms it from here on
-        asked = GateRequest(action="disarm", operator=self.terms.operator)
-        return self._bus.ask(ARM, asked, ASK_SECONDS)
+        if self.is_bout_on and self.referee is not None:
+            asked = PlayRequest(
+                action="abandon", bout=self.referee.bout, reason="the match was stopped"
+            )
+            self._bus.ask(BOUT, asked, ASK_SECONDS)
+        disarm = GateRequest(action="disarm", operator=self.terms.operator)
+        return self._bus.ask(ARM, disarm, ASK_SECONDS)
 
     def close(self) -> None:
         """Stop listening."""
@@ -175,7 +180,9 @@ class Match:
 
     # -- listening --------------------------------------------------------------------------
 
-    def _hear(self, now: float) -> None:
+    def hear(self) -> None:
+        """Take what was said, and ask for nothing."""
+        now = self._clock.now()
         if (gate := self._gates.take()) is not None:
             before, self.gate, self._gate_at = self.gate, gate, now
             if before is None or before.mode != gate.mode:

@@ -67,11 +67,15 @@ def test_ctrl_c_ends_in_order_and_a_person_reaches_the_robot_before(
             assert cli.main(["robot", "reset", "--run", str(folder)]) == 1
             assert "there is nothing to reset" in capsys.readouterr().out
             assert "the robot is disarmed: disarmed by" in onlooker.referee[-1].reason
+            match.until(lambda: cli.main(["robot", "arm", "--run", str(folder)]) == 0)
+            onlooker.until(onlooker.is_fencing)
         match.process.send_signal(signal.SIGINT)
         code, said = match.finish()
     assert code == 130, said
     assert "ended early: stopped by Ctrl-C" in said
-    assert match.summary["bouts"][0]["outcome"] == "void"
+    reasons = [bout["reason"] for bout in match.summary["bouts"]]
+    assert "the robot is disarmed: disarmed by" in reasons[0]
+    assert reasons[-1] == "the match was stopped"
     assert processes_of(folder) == []
     events = [event for event in log_of(folder, "play") if "process" in event]
     started = [event["process"] for event in events if event["event"] == "process_started"]

@@ -196,5 +196,8 @@ def test_the_end_of_a_match_shuts_the_gate():
     stage.tick(0.2)
     assert shut.take() is not None
     assert stage.mode == "disarmed"
+    assert stage.abandoned[0].reason == "the match was stopped"
+    stage.match.hear()
+    assert stage.match.results[0].outcome == "void"
     stage.tick(5.0)
     assert stage.arm_count == 1
