@@ -1,4 +1,6 @@
 import dataclasses
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +58,20 @@ def test_players_who_have_not_met_anybody_yet_keep_their_place(tmp_path: Path):
     )
     save(some, tmp_path / "bouts.parquet")
     assert same(load(tmp_path / "bouts.parquet"), some)
+
+
+@pytest.mark.slow
+def test_a_program_that_has_read_a_table_ends_well(tmp_path: Path):
+    """With pyarrow's own threads about one in five aborted at the end of the interpreter."""
+    save(table(), tmp_path / "bouts.parquet")
+    code = (
+        "import sys; from pathlib import Path; from shared.styles.bouts import load; "
+        "load(Path(sys.argv[1]))"
+    )
+    command = [sys.executable, "-P", "-c", code, str(tmp_path / "bouts.parquet")]
+    for _ in range(20):
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_labels_fall_back_to_the_first_digits_of_the_hash():
