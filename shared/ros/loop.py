@@ -17,6 +17,7 @@ from shared.ros.xmlrpc import place_of
 WORKERS: Final = 4
 """Threads for what may take a while: names of machines, handlers of services."""
 _CLOSE_SECONDS: Final = 2.0
+_CLOSE_ROUNDS: Final = 5
 
 T = TypeVar("T")
 
@@ -92,13 +93,15 @@ class SocketLoop:
         self._loop.run_forever()
 
     async def _cancel_all(self) -> None:
-        # Not only those begun here: a server makes a task of each connection.
-        tasks = asyncio.all_tasks() - {asyncio.current_task()}
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        # Not only those begun here: a server makes tasks of its own of each connection, and a
+        # transport that was closed lets go of its socket a little later.
+        for _ in range(_CLOSE_ROUNDS):
+            tasks = asyncio.all_tasks() - {asyncio.current_task()}
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            await asyncio.sleep(0.0)
         await self._loop.shutdown_asyncgens()
-        await asyncio.sleep(0.0)  # transports that were closed let go of their sockets
 
     def _ended(self, task: asyncio.Task[Any]) -> None:
         self._tasks.discard(task)

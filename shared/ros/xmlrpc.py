@@ -124,6 +124,8 @@ class XmlRpcServer:
         self._methods = methods
         self._server: asyncio.Server | None = None
         self._busy = 0
+        self._is_closed = False
+        self._serving: dict[asyncio.StreamWriter, asyncio.Task[None]] = {}
         self.refused = 0
         """Requests that were none."""
 
@@ -134,14 +136,29 @@ class XmlRpcServer:
             OSError: this machine has no such address.
         """
         self._server = await asyncio.start_server(
-            self._serve, address, 0, limit=_LARGEST_HEAD, backlog=64
+            self._take, address, 0, limit=_LARGEST_HEAD, backlog=64
         )
         return cast("int", self._server.sockets[0].getsockname()[1])
 
     def close(self) -> None:
-        """Stop listening."""
+        """Stop listening, and let go of those who are just asking."""
+        self._is_closed = True
         if self._server is not None:
             self._server.close()
+        for writer in self._serving:
+            writer.transport.abort()
+
+    def _take(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Begin to serve a connection.
+
+        Not left to asyncio: one whose task ends before its first step would stay open.
+        """
+        if self._is_closed:
+            writer.transport.abort()
+            return
+        task = asyncio.get_running_loop().create_task(self._serve(reader, writer))
+        self._serving[writer] = task
+        task.add_done_callback(lambda _: self._serving.pop(writer, None))
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._busy += 1
