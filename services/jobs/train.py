@@ -60,7 +60,9 @@ def main(argv: Sequence[str]) -> int:
         atomic_write(folder / "config.toml", settings.to_toml().encode())
         if found.phase == "all" and not pipeline.is_begun(folder):
             pipeline.write(folder, pipeline.Pipeline())
-        commands.note(folder, ["train", *argv])
+        over = found.resume and is_over(folder, settings)
+        if not over:
+            commands.note(folder, ["train", *argv])
         _point_latest_at(folder)
         configure_logging(
             folder / "logs" / "train.jsonl", bound={"service": "train", "run_id": run}
@@ -68,7 +70,7 @@ def main(argv: Sequence[str]) -> int:
         # A signal ends the loop below; the deadline is for processes that will not stop.
         with stop_on_signals(deadline=180.0) as stop:
             try:
-                if found.resume and is_over(folder, settings):
+                if over:
                     log.info("run_over", folder=str(folder))
                 elif found.serial:
                     _train_serially(settings, folder, run, found.resume, stop)
