@@ -14,7 +14,7 @@ export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help train play test check format test-all slow chaos bench docs clean
+.PHONY: help train play rehearse test check format test-all slow chaos bench docs clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -43,6 +43,9 @@ train: $(STAMP) ## train two fencers on this machine and write a report
 
 play: $(PLAY_STAMP) ## fence against the robot in a browser; ARGS='--antagonist heuristic' needs none
 	@$(BIN)/riposte play $(ARGS)
+
+rehearse: $(STAMP) ## a PR2, a Vive, a strap and a sound card that are not there, to rehearse in
+	@$(BIN)/python -m tests.integration.full_stack.rehearsal $(ARGS)
 
 test: $(STAMP) ## unit, property, integration and replay tests
 	@$(BIN)/pytest -q -m "not slow and not chaos and not hardware and not gpu and not bench" \
