@@ -82,7 +82,9 @@ class Lockstep:
         """How many messages a reader of the link was not there for yet."""
         if self.fake is not None:
             assert isinstance(self.link, Pr2Link)
-            wait_for(lambda: self.counter("pr2_states") > 0, self._nudge)
+            # All of them: what is published before a reader is there never reaches it.
+            wait_for(lambda: all(reader.received for reader, _ in self._wires()), self._nudge)
+            assert self.counter("pr2_states") > 0
             self.until(lambda: not self.obstacles(), 8.0)
 
     def _parts(self, cfg: RobotIoConfig, bus: Any) -> Parts:
@@ -240,17 +242,24 @@ class Lockstep:
         """Let the robot's time pass, and wait until the link has heard what it said."""
         if self.fake is None:
             return
-        assert isinstance(self.link, Pr2Link)
         self.fake.catch_up()
+        for reader, writer in self._wires():
+            if reader not in self._behind:
+                self._behind[reader] = writer.published - writer.dropped - reader.received
+            wait_for(
+                lambda r=reader, w=writer: r.received >= w.published - w.dropped - self._behind[r]
+            )
+
+    def _wires(self) -> list[tuple[Any, Any]]:
+        """What the link reads, each with who writes it."""
+        assert self.fake is not None
+        assert isinstance(self.link, Pr2Link)
         wires = self.fake._wires
         pairs = [(self.link._joints, wires._joints), (self.link._boards, wires._power),
                  (self.link._motors, wires._halted)]  # fmt: skip
         if (topics := wires.carts.get("r_cart")) is not None:
             pairs.append((self.link._states, topics.state))
-        for reader, writer in pairs:
-            if reader not in self._behind:
-                self._behind[reader] = writer.published - reader.received
-            wait_for(lambda r=reader, w=writer: r.received >= w.published - self._behind[r])
+        return pairs
 
     def _heard(self) -> int:
         assert self.fake is not None

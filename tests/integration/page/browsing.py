@@ -51,6 +51,19 @@ class Player:
                 self._listen()
         return value
 
+    def arm(self) -> None:
+        """Click until the robot is armed: a refusal, such as for a late policy, is asked again."""
+
+        def is_armed() -> bool:
+            if self.read("frame().gate.mode") in ("ramping", "armed", "holding"):
+                return True
+            if self.read("action()") == "arm":
+                self.page.click("#primary")
+                self.page.wait_for_timeout(1000)
+            return False
+
+        self.until(is_armed)
+
     def act(self, action: str) -> None:
         """Click the large button once it offers that."""
         self.until(lambda: self.read("action()") == action)
