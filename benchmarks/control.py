@@ -24,9 +24,9 @@ import numpy as np
 from benchmarks.harness import process
 from benchmarks.training_run import ENDLESS, WARM_VERSION, training_run
 from services.jobs.bench import Check, Measurement, report_of, text_of
-from services.jobs.play_match import Match, Terms
-from services.jobs.play_plan import Plan, parse, plan_of
-from services.jobs.play_processes import processes
+from services.jobs.play.match import Match, Terms
+from services.jobs.play.plan import Plan, parse, plan_of
+from services.jobs.play.processes import processes
 from services.supervisor import Supervisor
 from shared.bus.base import Bus
 from shared.bus.config import BusConfig

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import structlog
 
-from services.jobs.play_plan import LAPTOP
+from services.jobs.play.plan import LAPTOP
 from services.policy.acting import Acting
 from services.policy.config import PolicyConfig
 from services.policy.loading import Loader

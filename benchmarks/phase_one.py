@@ -12,8 +12,8 @@ import msgspec
 from benchmarks.harness import ROOT
 from benchmarks.seeds import t_interval
 from services.jobs.bench import Check, Measurement
-from services.jobs.report import write_report
-from services.jobs.summary import LOWERS_GOAL, RECOVERS_GOAL, Summary
+from services.jobs.report.command import write_report
+from services.jobs.report.summary import LOWERS_GOAL, RECOVERS_GOAL, Summary
 from shared.errors import ConfigError
 from shared.telemetry.seed_curves import SeedCurve, Shade, seed_curves
 

@@ -19,8 +19,8 @@ from services.actor.config import ActorConfig
 from services.actor.service import Actor
 from services.jobs.bench import Check, Measurement
 from services.jobs.settings import Settings
-from services.jobs.tournament import begin_ledger
-from services.jobs.tournament_plan import Plan, batch_size
+from services.jobs.tournament.command import begin_ledger
+from services.jobs.tournament.plan import Plan, batch_size
 from services.league.service import League
 from shared.bus.memory import MemoryHub
 from shared.clock import SystemClock

@@ -12,7 +12,7 @@ from typing import Any
 import psutil
 
 from services.jobs.settings import Settings
-from services.jobs.train import processes
+from services.jobs.train.command import processes
 from services.league.history import RunState, VersionRecord
 from services.league.ledger import open_read_only
 from services.supervisor import ProcessSpec, Supervisor

@@ -10,7 +10,7 @@ from shared.errors import RiposteError
 
 
 class Command(NamedTuple):
-    """A subcommand: ``main(argv) -> exit code`` in ``module``."""
+    """A subcommand: ``main(argv) -> exit code`` in ``services.<module>``."""
 
     name: str
     module: str
@@ -18,31 +18,31 @@ class Command(NamedTuple):
 
 
 JOBS = (
-    Command("play", "services.jobs.play", "fence against the robot, or watch two policies do it"),
-    Command("robot", "services.jobs.robot", "check, arm, disarm or reset the robot"),
-    Command("train", "services.jobs.train", "train two fencers on this machine, with a report"),
-    Command("tournament", "services.jobs.tournament", "everybody of a run against everybody"),
-    Command("ratings", "services.jobs.ratings", "rate the players of a run's tournament"),
-    Command("status", "services.jobs.status", "who runs, and who waits for whom"),
-    Command("watch", "services.jobs.watch", "look at a run while it goes"),
-    Command("report", "services.jobs.report", "write a run's HTML report"),
-    Command("bench", "services.jobs.bench", "measure against the limit, in one run"),
-    Command("doctor", "services.jobs.doctor", "check this machine and say what to do"),
-    Command("styles", "services.jobs.styles", "how protagonists move, and the three to send"),
-    Command("export", "services.jobs.export", "a trained policy as ONNX, for other runtimes"),
-    Command("sim", "services.jobs.sim", "export the two-robot model as MJCF"),
-    Command("up", "services.jobs.up", "start and keep alive the processes a site file lists"),
+    Command("play", "jobs.play.command", "fence against the robot, or watch two policies do it"),
+    Command("robot", "jobs.robot.command", "check, arm, disarm or reset the robot"),
+    Command("train", "jobs.train.command", "train two fencers on this machine, with a report"),
+    Command("tournament", "jobs.tournament.command", "everybody of a run against everybody"),
+    Command("ratings", "jobs.tournament.ratings", "rate the players of a run's tournament"),
+    Command("status", "jobs.status", "who runs, and who waits for whom"),
+    Command("watch", "jobs.watch", "look at a run while it goes"),
+    Command("report", "jobs.report.command", "write a run's HTML report"),
+    Command("bench", "jobs.bench", "measure against the limit, in one run"),
+    Command("doctor", "jobs.doctor.command", "check this machine and say what to do"),
+    Command("styles", "jobs.styles.command", "how protagonists move, and the three to send"),
+    Command("export", "jobs.export", "a trained policy as ONNX, for other runtimes"),
+    Command("sim", "jobs.sim", "export the two-robot model as MJCF"),
+    Command("up", "jobs.up", "start and keep alive the processes a site file lists"),
 )
 SERVICES = (
-    Command("router", "services.router.__main__", "the bus's meeting point"),
-    Command("league", "services.league.__main__", "schedule, opponents, ledger"),
-    Command("learner", "services.learner.__main__", "one agent's PPO"),
-    Command("actor", "services.actor.__main__", "plays bouts in simulation"),
-    Command("recorder", "services.recorder.__main__", "writes and shows what happens"),
-    Command("policy", "services.policy.__main__", "plays one side of a live bout"),
-    Command("referee", "services.referee.__main__", "scores a live bout"),
-    Command("robot-io", "services.robot_io.__main__", "moves a robot, through the safety gate"),
-    Command("page", "services.page.__main__", "a live bout in a browser, and its mouse"),
+    Command("router", "router.__main__", "the bus's meeting point"),
+    Command("league", "league.__main__", "schedule, opponents, ledger"),
+    Command("learner", "learner.__main__", "one agent's PPO"),
+    Command("actor", "actor.__main__", "plays bouts in simulation"),
+    Command("recorder", "recorder.__main__", "writes and shows what happens"),
+    Command("policy", "policy.__main__", "plays one side of a live bout"),
+    Command("referee", "referee.__main__", "scores a live bout"),
+    Command("robot-io", "robot_io.__main__", "moves a robot, through the safety gate"),
+    Command("page", "page.__main__", "a live bout in a browser, and its mouse"),
 )
 COMMANDS = {command.name: command for command in (*JOBS, *SERVICES)}
 
@@ -52,7 +52,7 @@ EXTRAS = {
     "tensordict": "train",
     "matplotlib": "train",
     "sklearn": "styles",
-    "scipy": "styles",
+    "scipy": "robot",
     "onnx": "styles",
     "gymnasium": "env",
     "pettingzoo": "env",
@@ -94,7 +94,9 @@ def _run(command: Command, argv: Sequence[str]) -> int:
             from shared.runtime.logging import configure_logging
 
             configure_logging(None)  # services and long jobs add their log file
-        entry: Callable[[Sequence[str]], int] = importlib.import_module(command.module).main
+        entry: Callable[[Sequence[str]], int] = importlib.import_module(
+            f"services.{command.module}"
+        ).main
         return entry(argv)
     except RiposteError as error:
         return _say(f"{command.name}: {error}")

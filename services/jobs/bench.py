@@ -19,7 +19,7 @@ from typing import Any, Literal, Protocol, cast
 
 import msgspec
 
-from services.jobs.machine import processor
+from services.jobs.doctor.machine import processor
 from shared.config.site import nearest
 from shared.errors import ConfigError
 from shared.runtime.build import SOURCE_ROOT, commit

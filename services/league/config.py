@@ -3,6 +3,7 @@
 import msgspec
 
 from services.league.sampling import Rule, Sampler
+from shared.config.ranges import check_range
 from shared.errors import SnapshotError
 from shared.policy.players import scripted_player
 
@@ -85,27 +86,29 @@ class LeagueConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
         Raises:
             ValueError: a value is out of its range; says which, and what is allowed.
         """
-        _check("seed", self.seed, 0, 2**63 - 1)
-        _check("iterations", self.iterations, 1, 100)
-        _check("antagonist_updates", self.antagonist_updates, 1, 1_000_000)
-        _check("protagonist_updates", self.protagonist_updates, 1, 1_000_000)
-        _check("convergence_min_updates", self.convergence_min_updates, 0, 1_000_000)
-        _check("convergence_window", self.convergence_window, 1, 100_000)
-        _check("convergence_tolerance", self.convergence_tolerance, 0.0, 1e6)
-        _check("evaluation_bouts", self.evaluation_bouts, 0, 100_000)
-        _check("rounds", self.rounds, 0, 1000)
-        _check("round_iterations", self.round_iterations, 1, 10_000)
-        _check("round_antagonist_updates", self.round_antagonist_updates, 1, 1_000_000)
-        _check("round_protagonist_updates", self.round_protagonist_updates, 1, 1_000_000)
-        _check("sampler_window", self.sampler_window, 1, 100_000)
-        _check("pfsp_power", self.pfsp_power, 0.0, 100.0)
-        _check("anchor_share", self.anchor_share, 0.0, 1.0)
-        _check("points_per_reward", self.points_per_reward, 1e-6, 1e6)
+        check_range("league.seed", self.seed, 0, 2**63 - 1)
+        check_range("league.iterations", self.iterations, 1, 100)
+        check_range("league.antagonist_updates", self.antagonist_updates, 1, 1_000_000)
+        check_range("league.protagonist_updates", self.protagonist_updates, 1, 1_000_000)
+        check_range("league.convergence_min_updates", self.convergence_min_updates, 0, 1_000_000)
+        check_range("league.convergence_window", self.convergence_window, 1, 100_000)
+        check_range("league.convergence_tolerance", self.convergence_tolerance, 0.0, 1e6)
+        check_range("league.evaluation_bouts", self.evaluation_bouts, 0, 100_000)
+        check_range("league.rounds", self.rounds, 0, 1000)
+        check_range("league.round_iterations", self.round_iterations, 1, 10_000)
+        check_range("league.round_antagonist_updates", self.round_antagonist_updates, 1, 1_000_000)
+        check_range(
+            "league.round_protagonist_updates", self.round_protagonist_updates, 1, 1_000_000
+        )
+        check_range("league.sampler_window", self.sampler_window, 1, 100_000)
+        check_range("league.pfsp_power", self.pfsp_power, 0.0, 100.0)
+        check_range("league.anchor_share", self.anchor_share, 0.0, 1.0)
+        check_range("league.points_per_reward", self.points_per_reward, 1e-6, 1e6)
         for name in ("antagonist_anchors", "protagonist_anchors"):
             _check_scripted(name, getattr(self, name))
-        _check("batch_rollouts", self.batch_rollouts, 1, 4096)
-        _check("lease_seconds", self.lease_seconds, 0.5, 3600.0)
-        _check("ended_lease_seconds", self.ended_lease_seconds, 0.0, 600.0)
+        check_range("league.batch_rollouts", self.batch_rollouts, 1, 4096)
+        check_range("league.lease_seconds", self.lease_seconds, 0.5, 3600.0)
+        check_range("league.ended_lease_seconds", self.ended_lease_seconds, 0.0, 600.0)
         for name in ("score_weights", "shaping_weights"):
             weights: tuple[float, ...] = getattr(self, name)
             if not weights:
@@ -116,7 +119,7 @@ class LeagueConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
                     "give at most one per iteration"
                 )
             for weight in weights:
-                _check(name, weight, 0.0, 1e6)
+                check_range(f"league.{name}", weight, 0.0, 1e6)
         for iteration in range(1, self.iterations + 1):
             if (
                 weight_of(self.score_weights, iteration)
@@ -145,8 +148,3 @@ def _check_scripted(name: str, players: tuple[str, ...]) -> None:
             scripted_player(player)
         except SnapshotError as error:
             raise ValueError(f"league.{name}: {error}") from None
-
-
-def _check(name: str, value: float, low: float, high: float) -> None:
-    if not low <= value <= high:  # also refuses NaN
-        raise ValueError(f"league.{name} is {value}; allowed are {low:g} to {high:g}")

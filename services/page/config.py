@@ -4,6 +4,8 @@ import re
 
 import msgspec
 
+from shared.config.ranges import check_ranges
+
 PERSON = "person"
 _ORIGIN = re.compile(r"https?://[A-Za-z0-9.\-\[\]:]+")
 
@@ -46,13 +48,11 @@ class PageConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         for origin in self.origins:
             if not _ORIGIN.fullmatch(origin):
                 raise ValueError(f"origins has {origin!r}, expected such as http://lab-pc:8765")
-        for name, low, high in (
+        check_ranges(
+            self,
             ("port", 0, 65535), ("max_speed", 0.1, 4.0), ("turn_speed", 0.1, 10.0),
             ("countdown", 0.0, 30.0), ("rest", 0.0, 600.0),
-        ):  # fmt: skip
-            value = getattr(self, name)
-            if not low <= value <= high:  # also refuses NaN
-                raise ValueError(f"{name} is {value:g}; allowed are {low:g} to {high:g}")
+        )  # fmt: skip
         names = [name for name, _ in self.players]
         if not names or len(set(names)) != len(names) or not all(map(all, self.players)):
             raise ValueError(

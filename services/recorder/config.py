@@ -2,6 +2,8 @@
 
 import msgspec
 
+from shared.config.ranges import check_range
+
 
 class RecorderConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What is recorded, how finely, and where it is shown."""
@@ -39,18 +41,13 @@ class RecorderConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
         Raises:
             ValueError: a value is out of its range; says which, and what is allowed.
         """
-        _check("web_port", self.web_port, 0, 65535)
-        _check("frames_per_second", self.frames_per_second, 1.0, 100.0)
-        _check("live_period", self.live_period, 0.05, 5.0)
-        _check("file_period", self.file_period, 0.1, 60.0)
-        _check("archive_period", self.archive_period, 0.1, 60.0)
-        _check("status_period", self.status_period, 0.5, 60.0)
-        _check("bout_steps", self.bout_steps, 1, 1_000_000)
-        _check("bout_memory_mib", self.bout_memory_mib, 16, 65536)
-        _check("file_bouts_mib", self.file_bouts_mib, 0, 1 << 20)
-        _check("min_free_mib", self.min_free_mib, 0, 1 << 20)
-
-
-def _check(name: str, value: float, low: float, high: float) -> None:
-    if not low <= value <= high:  # also refuses NaN
-        raise ValueError(f"recorder.{name} is {value}; allowed are {low:g} to {high:g}")
+        check_range("recorder.web_port", self.web_port, 0, 65535)
+        check_range("recorder.frames_per_second", self.frames_per_second, 1.0, 100.0)
+        check_range("recorder.live_period", self.live_period, 0.05, 5.0)
+        check_range("recorder.file_period", self.file_period, 0.1, 60.0)
+        check_range("recorder.archive_period", self.archive_period, 0.1, 60.0)
+        check_range("recorder.status_period", self.status_period, 0.5, 60.0)
+        check_range("recorder.bout_steps", self.bout_steps, 1, 1_000_000)
+        check_range("recorder.bout_memory_mib", self.bout_memory_mib, 16, 65536)
+        check_range("recorder.file_bouts_mib", self.file_bouts_mib, 0, 1 << 20)
+        check_range("recorder.min_free_mib", self.min_free_mib, 0, 1 << 20)

@@ -18,7 +18,7 @@ from services.robot_io.scene import OpenVive, blade_of, person_tracker
 from services.robot_io.service import Parts, RobotIo
 from services.robot_io.trackers import PolicyTracker, Tracker
 from services.robot_io.twin import TwinLink
-from services.robot_io.vive_config import ViveConfig
+from services.robot_io.vive.config import ViveConfig
 from shared.bus.base import Bus
 from shared.clock import Clock, SystemClock
 from shared.errors import ConfigError
@@ -72,7 +72,9 @@ def vive_of(args: ServeArgs, bus: Bus, clock: Clock) -> OpenVive:
 
     def open_it(world_from_torso: Pose, start: Pose) -> Tracker:
         try:
-            from services.robot_io.vive import open_vive  # openvr only where a tracker is wanted
+            from services.robot_io.vive.tracker import (
+                open_vive,  # openvr only where a tracker is wanted
+            )
         except ModuleNotFoundError as error:
             raise ConfigError(
                 f"tracker = 'vive' needs {error.name}: pip install 'riposte[robot]'"

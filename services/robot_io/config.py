@@ -4,6 +4,8 @@ from typing import Literal
 
 import msgspec
 
+from shared.config.ranges import check_ranges
+
 Vector = tuple[float, float, float]
 
 LinkName = Literal["twin", "pr2"]
@@ -73,10 +75,7 @@ class SafetyConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
         Raises:
             ValueError: a value is out of its range; says which, and what is allowed.
         """
-        for name, low, high in _RANGES:
-            value = getattr(self, name)
-            if not low <= value <= high:  # also refuses NaN
-                raise ValueError(f"{name} is {value:g}; allowed are {low:g} to {high:g}")
+        check_ranges(self, *_RANGES)
         for first, second in _ORDERED:
             if getattr(self, first) > getattr(self, second):
                 raise ValueError(
@@ -137,13 +136,11 @@ class RobotIoConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         Raises:
             ValueError: a value is out of its range; says which, and what is allowed.
         """
-        for name, low, high in (
+        check_ranges(
+            self,
             ("answer_wait", 0.0, 0.008), ("referee_silence", 0.05, 5.0),
             ("twin_filter", 1e-4, 1.0), ("twin_delay", 0.0, 0.1), ("twin_force", 1.0, 100.0),
-        ):  # fmt: skip
-            value = getattr(self, name)
-            if not low <= value <= high:  # also refuses NaN
-                raise ValueError(f"{name} is {value:g}; allowed are {low:g} to {high:g}")
+        )  # fmt: skip
         if self.link == "pr2" and self.tracker == "policy":
             raise ValueError(
                 "link is 'pr2' and tracker is 'policy': against a PR2 plays a person; "

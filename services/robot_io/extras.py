@@ -6,8 +6,8 @@ must wait for a device waits on a thread of its own and hands over through a bou
 
 from typing import Protocol
 
-from services.robot_io.heart_rate import HeartRateConfig, open_heart_rate
-from services.robot_io.tones import TonesConfig, open_tones
+from services.robot_io.heart_rate.source import HeartRateConfig, open_heart_rate
+from services.robot_io.tones.tones import TonesConfig, open_tones
 from shared.bus.base import Bus
 from shared.clock import Clock
 from shared.runtime.serve import ServeArgs

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from services.robot_io.config import RobotIoConfig
-from services.robot_io.frames import heading
 from services.robot_io.limits import Blade
 from services.robot_io.poses import Pose, pose_of
 from services.robot_io.trackers import PageTracker, ReplayTracker, Tracker
+from services.robot_io.vive.frames import heading
 from shared.bus.base import Bus
 from shared.sim.model import FencingModel
 from shared.sim.twin import Twin, command_of

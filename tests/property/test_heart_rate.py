@@ -5,7 +5,7 @@ import contextlib
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.robot_io.heart_rate_packet import parse
+from services.robot_io.heart_rate.packet import parse
 from shared.errors import MessageError
 from shared.testing.fake_bluez.packet import measurement
 

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from services.jobs.settings import Settings
-from services.jobs.tournament_plan import Plan
-from services.jobs.tournament_results import plan_of, standings_of, table_of
+from services.jobs.tournament.plan import Plan
+from services.jobs.tournament.results import plan_of, standings_of, table_of
 from services.league.config import LeagueConfig
 from services.league.events import Entry, RunStarted
 from services.league.history import RunState

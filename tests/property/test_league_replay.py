@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from services.jobs.draws import replay as drawn_again
+from services.jobs.reproduction.draws import replay as drawn_again
 from services.league.config import LeagueConfig
 from services.league.history import RunState
 from services.league.leases import is_chunk_open

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.robot_io.tones_synth import RAMP_SECONDS, ToneSynth
+from services.robot_io.tones.synth import RAMP_SECONDS, ToneSynth
 
 HZ = st.just(0.0) | st.sampled_from((300.0, 440.0)) | st.floats(300.0, 8000.0)
 BLOCKS = st.lists(st.tuples(st.integers(1, 2048), HZ), min_size=1, max_size=40)

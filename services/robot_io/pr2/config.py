@@ -2,6 +2,8 @@
 
 import msgspec
 
+from shared.config.ranges import check_ranges
+
 
 class Pr2Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Where the robot is, and what its controller must have been set up with."""
@@ -40,12 +42,10 @@ class Pr2Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         Raises:
             ValueError: a value is out of its range; says which, and what is allowed.
         """
-        for name, low, high in (
+        check_ranges(
+            self,
             ("kp_trans", 1.0, 2000.0), ("kd_trans", 0.1, 100.0), ("kp_rot", 0.1, 500.0),
             ("kd_rot", 0.01, 20.0), ("pose_command_filter", 1e-4, 1.0),
             ("vel_saturation_trans", 0.05, 2.0), ("vel_saturation_rot", 0.1, 8.0),
             ("clock_offset", 1e-4, 1.0),
-        ):  # fmt: skip
-            value = getattr(self, name)
-            if not low <= value <= high:  # also refuses NaN
-                raise ValueError(f"{name} is {value:g}; allowed are {low:g} to {high:g}")
+        )  # fmt: skip

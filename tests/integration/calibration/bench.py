@@ -11,10 +11,10 @@ from services.robot_io.poses import Pose
 from services.robot_io.service import RobotIo
 from services.robot_io.trackers import Tracker
 from services.robot_io.twin import TwinLink
-from services.robot_io.vive import ViveTracker
-from services.robot_io.vive_config import ViveConfig
-from services.robot_io.vive_device import ViveDevice
-from services.robot_io.vive_source import ViveSource
+from services.robot_io.vive.config import ViveConfig
+from services.robot_io.vive.device import ViveDevice
+from services.robot_io.vive.source import ViveSource
+from services.robot_io.vive.tracker import ViveTracker
 from shared.bus.memory import MemoryHub
 from shared.clock import ManualClock
 from shared.messages.play import BatStates, GateReply, GateRequest

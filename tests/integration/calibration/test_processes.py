@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from services.robot_io.calibration import load_calibration
+from services.robot_io.vive.calibration import load_calibration
 from shared.bus.ports import free_port
 from shared.testing.fake_vive.runtime import has_compiler
 from tests.integration.calibration.hand_moved import SEED

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from services.jobs.calibrate import Gathering, calibration_of
-from services.robot_io.calibration import save_calibration
-from services.robot_io.vive_config import ViveConfig
+from services.jobs.robot.calibrate import Gathering, calibration_of
+from services.robot_io.vive.calibration import save_calibration
+from services.robot_io.vive.config import ViveConfig
 from shared.testing.fake_vive.runtime import FakeVive
 from tests.integration.calibration.bench import Bench, matrix_of
 from tests.integration.vive.conftest import SERIAL

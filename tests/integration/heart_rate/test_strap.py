@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from structlog.testing import capture_logs
 
-from services.robot_io.heart_rate import Beat, HeartRateConfig
-from services.robot_io.heart_rate_ble import BleStrap
+from services.robot_io.heart_rate.ble import BleStrap
+from services.robot_io.heart_rate.source import Beat, HeartRateConfig
 from shared.clock import SystemClock
 from shared.testing.fake_bluez.packet import measurement
 from shared.testing.fake_bluez.strap import FakeBluez

@@ -8,13 +8,13 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from services.robot_io.frames import heading
 from services.robot_io.links import RobotState
 from services.robot_io.pr2 import link as link_module
 from services.robot_io.pr2 import watch
 from services.robot_io.pr2.config import Pr2Config
 from services.robot_io.pr2.link import Pr2Link
 from services.robot_io.pr2.state import BatFrame
+from services.robot_io.vive.frames import heading
 from shared.clock import SystemClock
 from shared.ros.node import Node
 from shared.sim.arm import load_arm

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from services import cli
-from services.jobs import machine
-from services.jobs.machine import check_bus
+from services.jobs.doctor import machine
+from services.jobs.doctor.machine import check_bus
 from services.jobs.status import main as status
 from shared.bus.config import BusConfig
 from shared.bus.ports import free_port

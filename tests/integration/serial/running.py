@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from services.jobs.serial import SerialRun
 from services.jobs.settings import Settings
+from services.jobs.train.serial import SerialRun
 from tests.integration.small import SMALL
 
 RUN = "serial-run"

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from services.jobs.runs import state_of
-from services.jobs.serial import SerialRun
 from services.jobs.settings import Settings
+from services.jobs.train.serial import SerialRun
 from services.league.events import RunStarted
 from services.league.ledger import Ledger
 from services.league.service import League

@@ -11,9 +11,9 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from services.jobs.report import write_report
-from services.jobs.reproduction_page import heat
-from services.jobs.reproduction_parts import Cell, Score, Tournament
+from services.jobs.report.command import write_report
+from services.jobs.reproduction.page import heat
+from services.jobs.reproduction.parts import Cell, Score, Tournament
 from shared.clock import SystemClock
 from shared.telemetry import html
 from tests.integration.telemetry.browser import Browser, find_chromium

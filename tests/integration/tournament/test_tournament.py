@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from services.jobs.ratings import bouts_of
 from services.jobs.runs import state_of
-from services.jobs.tournament_results import standings_of
+from services.jobs.tournament.ratings import bouts_of
+from services.jobs.tournament.results import standings_of
 from shared.styles.bouts import load
 from tests.integration.tournament.playing import assert_one_opponent_a_bout, riposte, tournament
 from tests.integration.training.training import one_line, processes_of

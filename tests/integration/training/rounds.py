@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from services.jobs.draws import replay
+from services.jobs.reproduction.draws import replay
 from services.league.events import BoutsPlayed
 from services.league.ledger import open_read_only
 from services.league.rounds import Turn, rounds_stages

@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from services.jobs.reproduction_parts import Reproduction
+from services.jobs.reproduction.parts import Reproduction
 from services.jobs.settings import BUDGETS, Settings
 from services.league.history import RunState
 from shared.styles.bundle import load_bundle

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from services.robot_io.calibration import Calibration, Frame, save_calibration
-from services.robot_io.frames import inverse
 from services.robot_io.scene import torso_of
+from services.robot_io.vive.calibration import Calibration, Frame, save_calibration
+from services.robot_io.vive.frames import inverse
 from shared.sim.config import SimConfig
 from shared.sim.model import FencingModel
 from shared.testing.fake_vive.runtime import FakeVive

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from services.robot_io.vive_device import RAW, ViveDevice
-from services.robot_io.vive_source import SteamVrError
+from services.robot_io.vive.device import RAW, ViveDevice
+from services.robot_io.vive.source import SteamVrError
 from shared.testing.fake_vive.runtime import OVERRIDE, FakeVive
 from tests.integration.robot_io.site import ROOT
 from tests.integration.vive.conftest import SERIAL
@@ -116,7 +116,7 @@ def test_no_steamvr_at_all_ends_robot_io_with_one_line(tmp_path: Path):
     done = subprocess.run(
         [
             sys.executable, "-c",
-            "from services.robot_io.vive_device import ViveDevice\n"
+            "from services.robot_io.vive.device import ViveDevice\n"
             "from shared.errors import RobotFault\n"
             "try: ViveDevice().open()\n"
             "except RobotFault as error: print(error)",

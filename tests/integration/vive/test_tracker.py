@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from services.robot_io.__main__ import build
-from services.robot_io.frames import IDENTITY
 from services.robot_io.trackers import TrackedBat
-from services.robot_io.vive import ViveTracker, open_vive
-from services.robot_io.vive_child import ViveChild
-from services.robot_io.vive_config import ViveConfig
+from services.robot_io.vive.child import ViveChild
+from services.robot_io.vive.config import ViveConfig
+from services.robot_io.vive.frames import IDENTITY
+from services.robot_io.vive.tracker import ViveTracker, open_vive
 from shared.bus.memory import MemoryHub
 from shared.clock import SystemClock
 from shared.errors import RobotFault

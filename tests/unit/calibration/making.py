@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from services.robot_io.calibration import Calibration, Frame, save_calibration
+from services.robot_io.vive.calibration import Calibration, Frame, save_calibration
 
 STAND = Frame(position=(0.0, 0.0, 0.0), orientation=(1.0, 0.0, 0.0, 0.0))
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from services.jobs import robot
-from services.jobs.calibrate import (
+from services.jobs.robot import command as robot
+from services.jobs.robot.calibrate import (
     HEARD_SECONDS,
     POSE_SECONDS,
     Docking,
@@ -18,8 +18,8 @@ from services.jobs.calibrate import (
     lines,
     main,
 )
-from services.robot_io.calibration import load_calibration, save_calibration
-from services.robot_io.hand_eye import Refused
+from services.robot_io.vive.calibration import load_calibration, save_calibration
+from services.robot_io.vive.hand_eye import Refused
 from shared.bus.memory import MemoryHub
 from shared.clock import ManualClock
 from shared.errors import ConfigError, RobotFault

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from services.robot_io.calibration import load_calibration
+from services.robot_io.vive.calibration import load_calibration
 from shared.errors import ConfigError
 from tests.unit.calibration.making import calibration, write
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from services.robot_io.hand_eye import LEAST_SPREAD, Refused, solve, spread_of
+from services.robot_io.vive.hand_eye import LEAST_SPREAD, Refused, solve, spread_of
 from tests.unit.calibration.making import pairs, truth
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from services.robot_io.pairs import PairCollector, apart
+from services.robot_io.vive.pairs import PairCollector, apart
 
 HERE = np.array([0.5, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0])
 

@@ -4,7 +4,7 @@ import msgspec
 
 from services.robot_io.config import RobotIoConfig
 from services.robot_io.extras import Extras
-from services.robot_io.heart_rate import HeartRateConfig, open_heart_rate
+from services.robot_io.heart_rate.source import HeartRateConfig, open_heart_rate
 from services.robot_io.service import RobotIo
 from shared.messages.topics import HEART_RATE
 from tests.unit.robot_io.looping import Looping

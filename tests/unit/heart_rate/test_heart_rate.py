@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from structlog.testing import capture_logs
 
-from services.robot_io.heart_rate import (
+from services.robot_io.heart_rate.replay import HeartRateReplay
+from services.robot_io.heart_rate.source import (
     Beat,
     HeartRateConfig,
     HeartRateFeed,
     open_heart_rate,
 )
-from services.robot_io.heart_rate_replay import HeartRateReplay
 from shared.bus.memory import MemoryHub
 from shared.clock import ManualClock
 from shared.errors import ConfigError
@@ -209,7 +209,7 @@ def test_no_heart_rate_is_the_default():
 
 
 def test_a_strap_without_its_library_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.delitem(sys.modules, "services.robot_io.heart_rate_ble", raising=False)
+    monkeypatch.delitem(sys.modules, "services.robot_io.heart_rate.ble", raising=False)
     monkeypatch.setitem(sys.modules, "bleak", None)
     clock = ManualClock()
     with pytest.raises(ConfigError, match=r"needs bleak .*: `pip install riposte\[robot\]`"):

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from services.robot_io.heart_rate_packet import Packet, parse
+from services.robot_io.heart_rate.packet import Packet, parse
 from shared.errors import MessageError
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from services.jobs.play_match import Match, Terms
+from services.jobs.play.match import Match, Terms
 from shared.bus.memory import MemoryHub
 from shared.clock import ManualClock
 from shared.messages.play import (

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from services.jobs.arguments import check_folder, folder_of, is_over, parse, settings_of
 from services.jobs.settings import Settings
+from services.jobs.train.arguments import check_folder, folder_of, is_over, parse, settings_of
 from shared.errors import ConfigError
 from tests.unit.jobs.ledgers import stopped_run
 from tests.unit.jobs.two_phases import played_run

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from services.jobs import commands
-from services.jobs.arguments import folder_of, parse
-from services.jobs.report import write_report
+from services.jobs.report.command import write_report
+from services.jobs.train.arguments import folder_of, parse
 from tests.unit.jobs.ledgers import finished_run, stopped_run
 from tests.unit.jobs.two_phases import played_run
 

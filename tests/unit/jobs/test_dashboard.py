@@ -4,8 +4,8 @@ from typing import Any
 
 from rich.console import Console
 
-from services.jobs.dashboard import Dashboard
-from services.jobs.dashboard_view import State, line, render, sparkline
+from services.jobs.train.dashboard import Dashboard
+from services.jobs.train.dashboard_view import State, line, render, sparkline
 from shared.bus.memory import MemoryHub
 from shared.clock import ManualClock
 from shared.messages.live import Progress, ServiceStatus

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from services.jobs.pipeline import Pipeline, read, run_jobs, write
+from services.jobs.train.pipeline import Pipeline, read, run_jobs, write
 
 JOBS = (("first", "pipeline_first"), ("second", "pipeline_second"))
 

@@ -11,8 +11,9 @@ import msgspec
 import pytest
 
 from services import cli
-from services.jobs import play_plan, play_seats
-from services.jobs.play_plan import LAPTOP, parse, plan_of
+from services.jobs.play import plan as play_plan
+from services.jobs.play import seats as play_seats
+from services.jobs.play.plan import LAPTOP, parse, plan_of
 from services.jobs.site import section_types
 from services.robot_io.config import RobotIoConfig, SafetyConfig
 from shared.config.site import load_section, load_site

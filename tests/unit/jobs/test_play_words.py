@@ -8,12 +8,13 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from services.jobs import play_page, robot
-from services.jobs.play_match import BoutResult
-from services.jobs.play_plan import Plan, parse, plan_of
-from services.jobs.play_processes import processes
-from services.jobs.play_screen import Screen, line
-from services.jobs.play_summary import PlayedMatch, summary_of, summary_text, write_summary
+from services.jobs.play import page as play_page
+from services.jobs.play.match import BoutResult
+from services.jobs.play.plan import Plan, parse, plan_of
+from services.jobs.play.processes import processes
+from services.jobs.play.screen import Screen, line
+from services.jobs.play.summary import PlayedMatch, summary_of, summary_text, write_summary
+from services.jobs.robot import command as robot
 from shared.errors import ConfigError, RiposteError
 from shared.messages.live import ServiceStatus
 from shared.messages.play import GateReply

@@ -6,12 +6,19 @@ import msgspec
 import numpy as np
 import pytest
 
-from services.jobs import commands, report
-from services.jobs.pictures import Moment, caption, choose
-from services.jobs.report import write_report
-from services.jobs.summarise import bins
-from services.jobs.summary import Score, Summary
-from services.jobs.words import clock_text, duration_text, headline, points_text, summary_text
+from services.jobs import commands
+from services.jobs.report import command as report
+from services.jobs.report.command import write_report
+from services.jobs.report.pictures import Moment, caption, choose
+from services.jobs.report.summarise import bins
+from services.jobs.report.summary import Score, Summary
+from services.jobs.report.words import (
+    clock_text,
+    duration_text,
+    headline,
+    points_text,
+    summary_text,
+)
 from services.league.history import CurvePoint
 from shared.errors import ConfigError, LedgerError
 from tests.unit.jobs.ledgers import BOUTS, SAMPLES, UPDATES, empty_run, finished_run, stopped_run

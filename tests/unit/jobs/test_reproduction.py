@@ -4,13 +4,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from services.jobs import styles_summary
-from services.jobs.draws import Draw, fit_of, replay
-from services.jobs.report import write_report
-from services.jobs.reproduction import gather
-from services.jobs.reproduction_parts import Claim, Reproduction
-from services.jobs.summarise import Facts, summarise
-from services.jobs.summary import Origin
+from services.jobs.report.command import write_report
+from services.jobs.report.summarise import Facts, summarise
+from services.jobs.report.summary import Origin
+from services.jobs.reproduction.draws import Draw, fit_of, replay
+from services.jobs.reproduction.parts import Claim, Reproduction
+from services.jobs.reproduction.report import gather
+from services.jobs.styles import summary as styles_summary
 from services.league.history import RunState
 from services.league.ledger import open_read_only
 from shared.game.rules import RuleBook

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from services import cli
-from services.jobs.styles import styles_text, trained_by, write_styles
-from services.jobs.styles_summary import StylesSummary
+from services.jobs.styles.command import styles_text, trained_by, write_styles
+from services.jobs.styles.summary import StylesSummary
 from shared.errors import ConfigError, RiposteError
 from shared.styles.bouts import save
 from shared.styles.bundle import load_bundle

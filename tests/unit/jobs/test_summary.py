@@ -1,4 +1,4 @@
-from services.jobs.summarise import BIN_BOUTS, bins
+from services.jobs.report.summarise import BIN_BOUTS, bins
 from services.league.history import CurvePoint
 
 

@@ -19,7 +19,7 @@ def test_the_defaults_are_in_range() -> None:
         ({"lease_seconds": 0.1}, "league.lease_seconds is 0.1; allowed are 0.5 to 3600"),
         ({"score_weights": ()}, "league.score_weights is empty"),
         ({"score_weights": (1.0, 1.0, 1.0)}, "has 3 numbers for 2 iterations"),
-        ({"shaping_weights": (-1.0,)}, "league.shaping_weights is -1.0"),
+        ({"shaping_weights": (-1.0,)}, "league.shaping_weights is -1;"),
         ({"score_weights": (1.0, 0.0), "shaping_weights": (0.0,)}, "both 0 in iteration 2"),
     ],
 )

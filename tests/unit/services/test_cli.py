@@ -16,7 +16,7 @@ def command(monkeypatch):
     def make(entry) -> None:
         module = types.ModuleType("tried")
         module.main = entry  # type: ignore[attr-defined]
-        monkeypatch.setitem(sys.modules, "tried", module)
+        monkeypatch.setitem(sys.modules, "services.tried", module)
         monkeypatch.setitem(cli.COMMANDS, "try", cli.Command("try", "tried", "a test"))
 
     return make
@@ -24,7 +24,7 @@ def command(monkeypatch):
 
 @pytest.mark.parametrize("name", sorted(cli.COMMANDS))
 def test_every_listed_command_is_there(name: str):
-    assert util.find_spec(cli.COMMANDS[name].module) is not None
+    assert util.find_spec(f"services.{cli.COMMANDS[name].module}") is not None
 
 
 def test_help_lists_every_command_and_loads_none():

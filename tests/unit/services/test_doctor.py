@@ -3,8 +3,9 @@ from pathlib import Path
 
 import pytest
 
-from services.jobs import doctor, machine, software
-from services.jobs.finding import Finding
+from services.jobs.doctor import command as doctor
+from services.jobs.doctor import machine, software
+from services.jobs.doctor.finding import Finding
 from shared.bus.memory import MemoryHub
 from shared.clock import SystemClock
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from services.robot_io.tones_synth import RAMP_SECONDS, ToneSynth
+from services.robot_io.tones.synth import RAMP_SECONDS, ToneSynth
 
 RATE = 48000.0
 VOLUME = 0.3

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from services.robot_io.tones import Tones, TonesConfig, open_tones
+from services.robot_io.tones.tones import Tones, TonesConfig, open_tones
 from shared.bus.memory import MemoryHub
 from shared.clock import ManualClock
 from shared.messages.play import RefereeState

@@ -1,7 +1,7 @@
 """A device that says what a test wants; the real one is in the integration tests."""
 
 from services.robot_io.poses import Pose
-from services.robot_io.vive_source import Sighting
+from services.robot_io.vive.source import Sighting
 
 
 class Scripted:

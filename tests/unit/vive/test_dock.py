@@ -1,8 +1,8 @@
 import pytest
 
-from services.robot_io.dock import DockCheck
 from services.robot_io.poses import Vector
-from services.robot_io.vive_config import ViveConfig
+from services.robot_io.vive.config import ViveConfig
+from services.robot_io.vive.dock import DockCheck
 
 DOCK = (1.0, 2.0, 0.5)
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from services.robot_io.frames import composed, heading, inverse, pose_of_rows
 from services.robot_io.poses import Pose, is_pose
+from services.robot_io.vive.frames import composed, heading, inverse, pose_of_rows
 
 
 def random_pose(rng: np.random.Generator) -> tuple[Pose, np.ndarray]:

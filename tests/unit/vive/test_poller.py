@@ -6,9 +6,9 @@ from collections.abc import Iterator
 import pytest
 
 from services.robot_io.poses import Pose
-from services.robot_io.vive_child import BUFFER_BYTES
-from services.robot_io.vive_poller import MAX_BYTES, Report, Sender, packed, unpacked
-from services.robot_io.vive_source import KEPT, Sample, Status, ViveSource
+from services.robot_io.vive.child import BUFFER_BYTES
+from services.robot_io.vive.poller import MAX_BYTES, Report, Sender, packed, unpacked
+from services.robot_io.vive.source import KEPT, Sample, Status, ViveSource
 from shared.clock import ManualClock
 from tests.unit.vive.steamvr import Scripted
 

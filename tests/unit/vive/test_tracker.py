@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from services.robot_io.calibration import Frame
-from services.robot_io.frames import IDENTITY
 from services.robot_io.poses import Pose
 from services.robot_io.trackers import TrackedBat
-from services.robot_io.vive import ViveTracker
-from services.robot_io.vive_config import ViveConfig
-from services.robot_io.vive_source import Sample, Status
+from services.robot_io.vive.calibration import Frame
+from services.robot_io.vive.config import ViveConfig
+from services.robot_io.vive.frames import IDENTITY
+from services.robot_io.vive.source import Sample, Status
+from services.robot_io.vive.tracker import ViveTracker
 from shared.bus.memory import MemoryHub
 from shared.clock import ManualClock
 from shared.messages.topics import TRACKER_RAW

@@ -1,0 +1,1 @@
+"""`riposte play`: a match on this machine, from its plan to its summary."""

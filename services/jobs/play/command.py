@@ -1,0 +1,215 @@
+"""`riposte play`: fence against the robot on a page, or let two policies play, on this machine.
+
+Starts router, recorder, robot_io, policies, referee and the page, shows how it goes, and ends with
+the scores. Where two policies play, typing the command arms the simulated robot, once; else a
+person does so on the page or with `riposte robot arm`, and a real robot is never armed otherwise.
+"""
+
+import contextlib
+import json
+import os
+import sys
+import threading
+import webbrowser
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+import structlog
+from rich.console import Console
+
+from services.jobs.play.match import Match, Terms
+from services.jobs.play.page import has_browser, read_page_url
+from services.jobs.play.plan import RUNS, Plan, parse, plan_of
+from services.jobs.play.processes import LIVE, processes
+from services.jobs.play.screen import Screen
+from services.jobs.play.summary import PlayedMatch, summary_of, summary_text, write_summary
+from services.jobs.train.processes import StopAsked, endpoint_of, wait_for_router
+from services.jobs.who import operator
+from services.supervisor import Supervisor
+from shared.bus.zenoh import open_zenoh
+from shared.clock import SystemClock
+from shared.errors import RiposteError
+from shared.runtime.files import RunLock, atomic_write, require_free_space
+from shared.runtime.logging import configure_logging
+from shared.runtime.serve import EXIT_BAD_INPUT, stop_on_signals
+
+FREE_BYTES = 256 << 20
+"""A match needs this much disk to begin with."""
+TICK_SECONDS = 0.03
+SHUT_SECONDS = 1.0
+"""Longest wait for the gate to shut at the end; the robot is held by robot_io's own end, too."""
+LATEST = "latest-play"
+EXIT_UNFINISHED = 1
+EXIT_INTERRUPTED = 130
+
+log = structlog.get_logger()
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Play a match; return the exit code."""
+    found = parse(sys.argv[1:] if argv is None else argv)
+    plan = plan_of(found)
+    console = Console(stderr=found.json)
+    folder = plan.folder
+    with RunLock(folder), Path(os.devnull).open("w") as nowhere:  # the screen says what happens
+        require_free_space(folder, FREE_BYTES)
+        atomic_write(folder / "config.toml", plan.settings.encode())
+        _point_latest_at(folder)
+        configure_logging(
+            folder / "logs" / "play.jsonl", console=nowhere,
+            bound={"service": "play", "run_id": plan.run},
+        )  # fmt: skip
+        # A signal ends the loop below; the deadline is for processes that will not stop.
+        with stop_on_signals(deadline=180.0) as stop:
+            course = Course(plan, console, stop, browser=not found.no_browser)
+            try:
+                code = course.run()
+            finally:
+                played = course.summary()
+                write_summary(folder, played)
+    if found.json:
+        print(msgspec.json.encode(played).decode())
+    else:
+        print(summary_text(folder, played))
+    return code
+
+
+def _point_latest_at(folder: Path) -> None:
+    """Let ``runs/latest-play`` be this match, when it lies in ``runs``."""
+    if folder.parent != RUNS:
+        return
+    link = RUNS / LATEST
+    with contextlib.suppress(OSError):
+        if link.is_symlink() or not link.exists():
+            temporary = link.with_name(f".{LATEST}.{os.getpid()}")
+            temporary.symlink_to(folder.name)
+            temporary.replace(link)
+
+
+class Course:
+    """A match from the first process to the last."""
+
+    def __init__(
+        self, plan: Plan, console: Console, stop: threading.Event, *, browser: bool
+    ) -> None:
+        """Prepare; ``stop`` is set when the person at the terminal asks to stop."""
+        self._plan = plan
+        self._console = console
+        self._stop = stop
+        self._browser = browser
+        self._clock = SystemClock()
+        self._deaths: list[str] = []
+        self._match: Match | None = None
+        self._screen: Screen | None = None
+        self._ended = ""
+
+    def summary(self) -> PlayedMatch:
+        """Return what came of it so far."""
+        results = self._match.results if self._match is not None else []
+        status = self._screen.status if self._screen is not None else None
+        return summary_of(self._plan, results, status, self._deaths, self._ended)
+
+    def run(self) -> int:
+        """Play; return the exit code.
+
+        Raises:
+            RiposteError: a process cannot be kept alive; the others are stopped.
+        """
+        plan = self._plan
+        endpoint = endpoint_of(plan.bus)
+        said = {"connect": endpoint, "run": plan.run}
+        atomic_write(plan.folder / "endpoint.json", json.dumps(said).encode())
+        supervisor = Supervisor(processes(plan, endpoint), plan.folder / "logs", self._clock)
+        try:
+            for event in supervisor.start():
+                log.info("process_started", process=event.name, pid=event.pid)
+            wait_for_router(endpoint, supervisor, self._stop)
+            return self._play(endpoint, supervisor)
+        except StopAsked:
+            self._ended = "stopped before it began"
+            return EXIT_INTERRUPTED
+        except RiposteError as error:
+            self._ended = str(error).partition("\n")[0]
+            raise
+        finally:
+            for event in supervisor.stop():
+                log.info("process_stopped", process=event.name, exit_code=event.exit_code)
+            (plan.folder / "endpoint.json").unlink(missing_ok=True)
+
+    def _play(self, endpoint: str, supervisor: Supervisor) -> int:
+        plan = self._plan
+        cfg = msgspec.structs.replace(plan.bus, connect=(endpoint,))
+        with contextlib.closing(open_zenoh(cfg, "play", self._clock, plan.run)) as bus:
+            match = self._match = Match(self._terms(), bus, self._clock)
+            with (
+                contextlib.closing(match),
+                Screen(plan, match, bus, self._clock, self._console) as screen,
+            ):
+                self._screen = screen
+                while not match.is_over and not self._stop.wait(TICK_SECONDS):
+                    bus.wait(0.0)
+                    self._watch(supervisor, match, screen)
+                    match.tick()
+                    self._open_page(screen)
+                    screen.tick()
+                shut = match.shut()
+                deadline = self._clock.now() + SHUT_SECONDS
+                while shut.take() is None or match.is_bout_on:
+                    if self._clock.now() >= deadline:
+                        break
+                    bus.wait(TICK_SECONDS)
+                    match.hear()
+                screen.tick()
+        self._ended = match.ended
+        if match.ended:
+            return EXIT_UNFINISHED
+        is_whole = not plan.bouts or match.finished >= plan.bouts
+        if not is_whole:
+            self._ended = "stopped by Ctrl-C"
+        return 0 if is_whole else EXIT_INTERRUPTED
+
+    def _terms(self) -> Terms:
+        plan = self._plan
+        return Terms(
+            antagonist=plan.antagonist.reference,
+            protagonist=plan.protagonist.reference,
+            bouts=plan.bouts,
+            arms=plan.is_armed_by_typing,
+            starts=plan.starts_bouts,
+            rest=plan.play.rest,
+            patience=plan.play.patience,
+            operator=operator(),
+            again=f"riposte robot arm --run {plan.folder}",
+        )
+
+    def _watch(self, supervisor: Supervisor, match: Match, screen: Screen) -> None:
+        """Start again what died, and keep the robot still where it depends on that."""
+        for event in supervisor.poll():
+            log.info(
+                f"process_{event.kind}", process=event.name, pid=event.pid,
+                exit_code=event.exit_code,
+            )  # fmt: skip
+            if event.kind == "gave_up":
+                is_told = event.exit_code == EXIT_BAD_INPUT  # in one line, which is its last
+                raise RiposteError(event.describe if is_told else f"{event.describe}\n{event.tail}")
+            screen.say(event.describe)
+            if event.kind == "died":
+                self._deaths.append(event.describe)
+                if event.name.startswith(LIVE):
+                    match.on_death(event.name)
+
+    def _open_page(self, screen: Screen) -> None:
+        """Say where the page is, once it is there, and open it."""
+        if screen.url or not self._plan.has_page:
+            return
+        if (url := read_page_url(self._plan.folder)) is None:
+            return
+        screen.url = url
+        screen.say(f"page: {url}")
+        if self._browser and has_browser():
+            webbrowser.open(url)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""`riposte robot`: what a person does with a robot: check, arm, disarm, reset, calibrate."""

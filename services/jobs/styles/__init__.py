@@ -1,0 +1,1 @@
+"""`riposte styles`: how protagonists move, and which three to send."""

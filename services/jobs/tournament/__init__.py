@@ -1,0 +1,1 @@
+"""`riposte tournament` and `ratings`: everybody of a run against everybody."""

@@ -1,0 +1,1 @@
+"""`riposte train`: from the command line to the last process."""

@@ -1,0 +1,1 @@
+"""A Vive tracker as the person's bat: SteamVR, calibration, dock."""
