@@ -89,3 +89,12 @@ def test_a_bug_is_not_hidden(command):
     command(entry)
     with pytest.raises(ModuleNotFoundError, match="sharde"):
         cli.main(["try"])
+
+
+def test_help_that_nobody_reads_on_ends_quietly():
+    command = f"{sys.executable} -m services.cli --help | true"
+    ended = subprocess.run(
+        ["bash", "-c", f"set -o pipefail; sleep 0.2; {command}"],
+        capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert (ended.returncode, ended.stderr) == (0, "")
