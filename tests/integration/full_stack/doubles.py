@@ -13,6 +13,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from shared.testing.fake_bluez.packet import measurement
 from shared.testing.fake_bluez.strap import FakeBluez
 from shared.testing.fake_vive.runtime import compile_client, has_compiler
@@ -60,11 +62,26 @@ class FakeRobot:
         """Return what it says of itself."""
         self.tell("status")
         assert self._process.stdout is not None
-        return self._process.stdout.readline().strip()
+        for line in self._process.stdout:  # its log comes this way, too
+            if line.startswith("tool at"):
+                return line.strip()
+        raise AssertionError("the fake PR2 has ended")
 
     def close(self) -> None:
         """Switch it off."""
         self._process.communicate("quit\n", timeout=30)
+
+
+class Fencer(Person):
+    """A person who thrusts deeper and sways, so that the bats meet now and then."""
+
+    def bat(self, seconds: float) -> np.ndarray:
+        """Return float64[4, 4], the bat in the world: a thrust each 2 s, from changing sides."""
+        matrix = super().bat(seconds)
+        matrix[0, 3] -= 0.25
+        matrix[1, 3] += 0.12 * np.sin(2.0 * np.pi * 0.23 * seconds)
+        matrix[2, 3] += 0.08 * np.sin(2.0 * np.pi * 0.31 * seconds)
+        return matrix
 
 
 class Lab:
@@ -119,7 +136,7 @@ def lab() -> Iterator[Lab]:
         home, folder = (Path(stack.enter_context(tempfile.TemporaryDirectory())) for _ in range(2))
         robot = FakeRobot()
         stack.callback(robot.close)
-        person = Person(folder, compile_client(folder / "vrclient"), SERIAL)
+        person = Fencer(folder, compile_client(folder / "vrclient"), SERIAL)
         stack.callback(person.close)
         sound = stack.enter_context(RecordedSound(home))
         bus = stack.enter_context(private_bus(folder))

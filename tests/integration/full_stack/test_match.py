@@ -8,14 +8,13 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import psutil
 import pytest
-import structlog
 
 from services import cli
 from shared.runtime.logging import configure_logging
-from shared.telemetry.archive import missing_ticks
 from tests.integration.full_stack.doubles import Lab, lab, lacks
 from tests.integration.full_stack.evidence import LOOP, Recorded, recorded, series_drawn
 from tests.integration.full_stack.hearing import SHORTEST, Hearing, asked
@@ -42,12 +41,13 @@ VOLUME = 0.3
 TOO_BUSY = 0.02
 """Share of the loop's ticks; a machine that loses more of them has no rates to speak of."""
 
-log = structlog.get_logger()
-
 
 @pytest.mark.timeout(240)
 def test_a_short_match_on_doubles_is_recorded_scored_and_heard(tmp_path: Path):
-    check_match(tmp_path / "match", bouts=2, bout_steps=400, rest=1.0)
+    found = check_match(
+        tmp_path / "match", "--protagonist", "heuristic", bouts=2, bout_steps=600, rest=1.0
+    )
+    assert any(one.bout.info.penalty_steps for one in found), "the bats never touched"
 
 
 @pytest.mark.timeout(1200)
@@ -55,9 +55,11 @@ def test_twenty_bouts_in_a_row_on_doubles_are_recorded_scored_and_heard(tmp_path
     check_match(tmp_path / "match", bouts=20, bout_steps=2000, rest=1.0)
 
 
-def check_match(folder: Path, *, bouts: int, bout_steps: int, rest: float) -> None:
-    """Play a match, armed once by a person, and look at all it has left."""
-    words = ("deploy/robot.toml", "--antagonist", "vive", "--bouts", str(bouts), "--no-browser")
+def check_match(
+    folder: Path, *players: str, bouts: int, bout_steps: int, rest: float
+) -> list[Recorded]:
+    """Play a match, armed once by a person, look at all it has left, and return it."""
+    words = ("deploy/robot.toml", *players, "--bouts", str(bouts), "--no-browser")
     own = (f"game.bout_steps={bout_steps}", f"play.rest={rest}", f"tones.volume={VOLUME}")
     with lab() as around:
         with playing(
@@ -81,13 +83,15 @@ def check_match(folder: Path, *, bouts: int, bout_steps: int, rest: float) -> No
     assert_nothing_tripped(match, found)
     assert_recorded(found)
     assert_heart(found, beats)
-    assert_tones(found, heard)
+    assert_tones(folder, found, heard)
     assert_rates(found)
+    return found
 
 
 def arm(match: Playing) -> None:
     """Arm the robot as a person does: once, with everything in order."""
     match.until(match.is_endpoint_there)
+    match.until(lambda: "robot disarmed" in match.said)
     match.until(lambda: cli.main(["robot", "check", "--run", str(match.folder)]) == 0)
     assert cli.main(["robot", "arm", "--run", str(match.folder)]) == 0
     configure_logging(None)
@@ -106,7 +110,8 @@ def assert_all_bouts_finished(match: Playing, bouts: int, bout_steps: int) -> No
     assert [bout["outcome"] for bout in summary["bouts"]] == ["finished"] * bouts, match.said
     for bout in summary["bouts"]:
         assert bout["seconds"] == pytest.approx(0.01 * bout_steps)
-        assert (bout["antagonist"], bout["protagonist"][:7]) == ("person", "sha256:")
+        assert bout["antagonist"] == "person"
+        assert bout["protagonist"].startswith(("sha256:", "scripted:"))
     assert (summary["link"], summary["ended"], summary["deaths"]) == ("pr2", "", [])
 
 
@@ -172,17 +177,19 @@ def assert_heart(found: list[Recorded], beats: int) -> None:
         assert set(rates.tolist()) <= set(np.arange(130.0, 140.0).tolist())
 
 
-def assert_tones(found: list[Recorded], heard: Hearing) -> None:
+def assert_tones(folder: Path, found: list[Recorded], heard: Hearing) -> None:
     """What the referee asked for sounded, and nothing else did."""
     tones = [tone for one in found for tone in asked(one.bout)]
     long = [tone for tone in tones if tone.end - tone.begin >= SHORTEST]
     silent = [tone for tone in long if not heard.hears(tone)]
-    lengths = {hz: sum(t.end - t.begin for t in tones if t.hz == hz) for hz in heard.heard}
-    log.info("tones_compared", asked=len(long), silent=len(silent), seconds=lengths,
-             unasked_seconds=heard.unasked(tones))  # fmt: skip
-    assert lengths[440.0] > 0.5, "nobody scored"
+    lengths = {
+        f"{hz:.0f} Hz": sum(t.end - t.begin for t in tones if t.hz == hz) for hz in heard.heard
+    }
+    unasked = heard.unasked(tones)
+    note(folder, asked=len(long), silent=len(silent), seconds=lengths, unasked_seconds=unasked)
+    assert lengths["440 Hz"] > 0.5, "nobody scored"
     assert len(silent) <= 0.1 * len(long)
-    assert heard.unasked(tones) <= 0.05 * sum(lengths.values())
+    assert unasked <= 0.05 * sum(lengths.values())
 
 
 def assert_rates(found: list[Recorded]) -> None:
@@ -193,10 +200,12 @@ def assert_rates(found: list[Recorded]) -> None:
         made = whole - lost
         for name in LOOP:
             if name != "protagonist_offsets":
-                assert len(one.within(name)) == pytest.approx(made, abs=3), name
+                rows = len(one.within(name))  # some have times of their own, a little before
+                assert rows == pytest.approx(made, abs=max(3.0, 0.005 * made)), name
         rows = one.within("referee")
         judged = rows["tick"][rows["phase"] == "running"]
-        assert len(judged) + missing_ticks(judged) == pytest.approx(one.bout.info.steps, abs=3)
+        missed = one.bout.info.missed_ticks
+        assert len(judged) + missed == pytest.approx(one.bout.info.steps, abs=2)
     skip_where_busy(found[-1].loop_counters(), "the rates were not looked at")
     for one in found:
         for series in series_drawn():
@@ -207,7 +216,7 @@ def assert_rates(found: list[Recorded]) -> None:
 
 
 def report(match: Playing, found: list[Recorded], robot: str) -> None:
-    """Log what people want to know of it."""
+    """Note how fast and how late everything was."""
     paths = {series.stream: series.path for series in series_drawn()}
     rates = {
         stream: round(float(np.mean([one.rate(path) for one in found])), 2)
@@ -222,9 +231,15 @@ def report(match: Playing, found: list[Recorded], robot: str) -> None:
         for name, values in gate.items()
     }
     whole, lost = np.sum([one.ticks() for one in found], axis=0)
-    log.info(
-        "match_looked_at", rates_hz=rates, p50_p99_max=times, ticks=int(whole), lost=int(lost),
+    note(
+        match.folder, rates_hz=rates, p50_p99_max=times, ticks=int(whole), lost=int(lost),
         scores=[bout["score"] for bout in match.summary["bouts"]],
         touches=[bout["penalty_steps"] for bout in match.summary["bouts"]],
         loop=match.summary["loop"], robot=robot,
     )  # fmt: skip
+
+
+def note(folder: Path, **what: object) -> None:
+    """Write down beside the match what people want to know of it."""
+    with folder.with_suffix(".jsonl").open("ab") as file:
+        file.write(msgspec.json.encode(what) + b"\n")
