@@ -1,7 +1,8 @@
 """Where a tool may go and how fast: one step of a command towards its goal, always stoppable.
 
 A command is only taken if braking straight from it, at the allowed deceleration, stays inside
-everything that is allowed; otherwise the command brakes, along the way that was checked before.
+everything that is allowed; where moving and turning together would not, it does one of the two, or
+else brakes, along the way that was checked before.
 So by induction no goal whatsoever leads out of the box, over a speed or over an acceleration.
 """
 
@@ -148,8 +149,12 @@ def advance(
     velocity = _towards(motion.velocity, way, speed, cfg.acceleration, period)
     turn = rotation_between(motion.pose.orientation, goal.orientation)
     spin = _towards(motion.spin, turn, turn_speed, cfg.turn_acceleration, period)
-    tried = _moved(motion, velocity, spin, period)
-    return tried if _is_safe(tried, braking, measured, space, cfg, period) else braking
+    # At a limit, moving and turning together may lead over it where one of the two does not.
+    for way_there in ((velocity, spin), (velocity, braking.spin), (braking.velocity, spin)):
+        tried = _moved(motion, *way_there, period)
+        if _is_safe(tried, braking, measured, space, cfg, period):
+            return tried
+    return braking
 
 
 def _towards(now: Vector, way: Vector, speed: float, acceleration: float, period: float) -> Vector:

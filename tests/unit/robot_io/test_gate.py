@@ -4,7 +4,7 @@ from typing import Any
 import pytest
 
 from services.robot_io.gate import disarmed
-from services.robot_io.poses import Pose, distance
+from services.robot_io.poses import Pose, distance, turned
 from tests.unit.robot_io.gates import PERIOD, START, Driven
 
 NAN = Pose((math.nan, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
@@ -252,6 +252,20 @@ def test_a_bat_does_not_go_above_the_ceiling():
         driven.step()
     tip = driven.measured.position[2] + 0.7 * math.sqrt(0.5)
     assert tip == pytest.approx(0.6 - 0.025, abs=1e-6)
+
+
+@pytest.mark.parametrize("lean", [0.1, -0.1])
+def test_a_bat_under_the_ceiling_reaches_another_place_under_it(lean: float):
+    driven = Driven(ceiling=0.6).armed()
+    driven.command = driven.toward(z=0.2)
+    driven.step(200)
+    leant = turned(driven.measured.orientation, (0.0, lean, 0.0))
+    driven.command = Pose(driven.toward(x=0.05, z=0.1).position, leant)
+    goal = driven.gate.space.nearest(driven.command)
+    driven.step(200)
+    assert driven.gate.space.clearance(goal) == pytest.approx(0.0, abs=1e-9)
+    assert driven.measured.position == pytest.approx(goal.position, abs=1e-4)
+    assert driven.measured.orientation == pytest.approx(goal.orientation, abs=1e-4)
 
 
 def test_a_bat_stays_out_of_the_place_where_the_person_stands():
