@@ -2,8 +2,8 @@
 
 A restarted controller takes where the arm is for its target, and its filter begins there. So a
 target that was never sent tells of a restart, or of another node that commands, and so does a
-filtered target that leaps; what the gate knew of the controller is void then. A stream that was
-silent, or went back in time, tells the same.
+filtered target that is not where its filter led it; what the gate knew is void then. A stream that
+was silent, or went back in time, tells the same.
 
 The controller's command thread writes the target while its realtime thread reads it, unlocked
 (JTCartesianController, ``commandPose``), so that one state in many thousands has a target that is
@@ -14,7 +14,7 @@ import math
 from collections import deque
 from typing import Final
 
-from services.robot_io.poses import Vector, distance
+from services.robot_io.poses import Vector, add, distance, scale
 
 SILENT_SECONDS: Final = 0.2
 """A running controller says its state a hundred times a second."""
@@ -23,9 +23,14 @@ SAME_M: Final = 1e-6
 REMEMBERED: Final = 256
 STRANGE_IN_A_ROW: Final = 2
 STRANGE_A_SECOND: Final = 3
-LEAP_M: Final = 0.003
-"""The filtered target may move by so much more than its filter lets it."""
+OFF_M: Final = 0.001
+"""The filtered target may be so far from where its filter leads it."""
+CYCLES: Final = 2.0
+"""By so many milliseconds may a state be earlier or later than its stamp says."""
+STATE_SECONDS: Final = 0.015
+"""Between two states, if none was lost."""
 LEAP_MARGIN: Final = 1.5
+"""Where some were, the filter may have followed targets that nobody saw: so much further."""
 
 
 class Restarts:
@@ -101,10 +106,29 @@ class Restarts:
         return any(distance(one, target) <= SAME_M for one in reversed(self._sent))
 
     def _leaps(self, passed: float, target: Vector, filtered: Vector) -> bool:
-        """Return whether the filtered target went further than its filter lets it."""
+        """Return whether the filtered target is where its filter cannot have led it.
+
+        It went towards the last target, then from some moment on towards the new one: so it is
+        between the ends of following only the one and only the other.
+        """
         old, last = self._filtered, self._last
         if old is None or last is None:
             return False
-        way = 1.0 - (1.0 - self._share) ** (1000.0 * passed + 1.0)
+        kept = (1.0 - self._share) ** (1000.0 * passed)
+        ends = [add(scale(old, kept), followed, 1.0 - kept) for followed in (last, target)]
         reach = max(distance(old, last), distance(old, target))
-        return distance(old, filtered) > LEAP_MARGIN * way * reach + LEAP_M
+        allowed = OFF_M + CYCLES * self._share * reach
+        if passed > STATE_SECONDS:
+            allowed += LEAP_MARGIN * (1.0 - kept) * reach
+        return _from_between(filtered, ends[0], ends[1]) > allowed
+
+
+def _from_between(point: Vector, first: Vector, second: Vector) -> float:
+    """Return how far a point is from the straight line that ends at two others (m)."""
+    along = add(second, first, -1.0)
+    size = math.hypot(*along)
+    if size == 0.0:
+        return distance(point, first)
+    there = add(point, first, -1.0)
+    share = sum(a * b for a, b in zip(there, along, strict=True)) / size**2
+    return distance(point, add(first, along, min(max(share, 0.0), 1.0)))

@@ -170,8 +170,11 @@ def watched(*states: tuple[float, float], filtered: float = 0.5) -> Restarts:
     restarts = Restarts(0.01)
     restarts.sent((0.6, 0.0, 0.0))
     restarts.sent((0.61, 0.0, 0.0))
+    before, followed = states[0]
     for stamp, x in states:
+        filtered += (1.0 - 0.99 ** (1000.0 * (stamp - before))) * (followed - filtered)
         restarts.observe(stamp, (x, 0.0, 0.0), (filtered, 0.0, 0.0))
+        before, followed = stamp, x
     return restarts
 
 
@@ -204,6 +207,36 @@ def test_a_filtered_target_that_leaps_is_a_restart() -> None:
     assert restarts.generation == 0
     restarts.observe(stamp, target, (x - 0.03, 0.0, 0.0))
     assert (restarts.generation, restarts.reason) == (1, "its filtered target leapt")
+
+
+@pytest.mark.parametrize("speed", [0.05, 0.29, 0.6])
+def test_a_controller_started_anew_under_steady_streaming_is_a_restart(speed: float) -> None:
+    restarts = Restarts(0.01)
+    lag = 0.034 * speed  # of the tool behind the filtered target: 134 ms less 100 ms
+    filtered, stamp = 0.5, 1.0
+    for count in range(60):
+        target = 0.5 + speed * 0.01 * count
+        restarts.sent((target, 0.0, 0.0))
+        if count == 50:
+            assert restarts.generation == 0
+            filtered -= lag  # it begins where the tool is, and the next command follows at once
+        restarts.observe(stamp, (target, 0.0, 0.0), (filtered, 0.0, 0.0))
+        filtered += (1.0 - 0.99**10) * (target - filtered)
+        stamp += 0.01
+    assert restarts.generation > 0
+
+
+def test_a_lost_state_is_no_restart() -> None:
+    restarts = Restarts(0.01)
+    filtered, stamp = 0.5, 1.0
+    for count in range(60):
+        target = 0.5 + 0.006 * count
+        restarts.sent((target, 0.0, 0.0))
+        if count not in (20, 30, 31):
+            restarts.observe(stamp, (target, 0.0, 0.0), (filtered, 0.0, 0.0))
+        filtered += (1.0 - 0.99**10) * (target - filtered)
+        stamp += 0.01
+    assert restarts.generation == 0
 
 
 def test_time_that_jumps_and_silence_are_restarts_a_late_loop_is_none() -> None:
