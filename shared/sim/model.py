@@ -63,7 +63,7 @@ class FencingModel:
     @staticmethod
     def of(cfg: SimConfig, parameters: ModelParameters) -> "FencingModel":
         """Compile the scene with ``parameters`` in place of the file that ``cfg`` names."""
-        _silence()
+        silence()
         try:
             spec = build_spec(cfg, parameters)
             mj = spec.compile()
@@ -110,7 +110,7 @@ class FencingModel:
         return shapes_of(self.scene)
 
 
-def _silence() -> None:
+def silence() -> None:
     """Keep MuJoCo from printing, and from writing MUJOCO_LOG.TXT where the process stands.
 
     What it would say is in the warning counters that ``FencingBatch.check`` reads.

@@ -1,0 +1,71 @@
+"""What a cause is: where it may sit, how big it is, and how it enters a simulation."""
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from shared.identification.dataset.types import Float64
+from shared.identification.subject import Subject
+from shared.sim.plant.row import Row
+from shared.sim.plant.structure import Structure
+
+Side = Literal["command", "plant", "joints", "tracker"]
+"""Whether a cause changes what reaches the controller, how the arm moves, or what is logged."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number of an effect; 0 is always "not there"."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    probe: float
+    """A size that a good recording shows and that is not extreme: where the search starts."""
+    is_smooth: bool = True
+    """Whether small changes of it change the motion a little; else it is searched on a grid."""
+
+
+class Effect(Protocol):
+    """One entry of the catalogue; a module of ``catalogue/`` has one, called ``EFFECT``."""
+
+    name: str
+    """``command_latency``: fixed, for programs."""
+    title: str
+    """For people, as a sentence without a full stop: ``commands reach the controller late``."""
+    signature: str
+    """How it shows in the residual, in one sentence."""
+    side: Side
+
+    def places(self, subject: Subject) -> tuple[str, ...]:
+        """Return where it may sit: names of joints, or ``""`` for the whole arm; none if nowhere.
+
+        Effects that the data or the arm rule out (no tracker, no gravity, no motion there) return
+        none.
+        """
+        ...
+
+    def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
+        """Return its numbers at a place."""
+        ...
+
+    def structure(self, subject: Subject, place: str) -> Structure:
+        """Return what must be compiled into the arm for it; mostly nothing."""
+        ...
+
+    def enter(self, row: Row, place: str, values: Float64) -> None:
+        """Change one arm: float64[Q], in the order of :meth:`quantities`."""
+        ...
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect at a place."""
+
+    effect: Effect
+    place: str
+
+    @property
+    def label(self) -> str:
+        """Return its name for people and for programs: ``coulomb_friction elbow_flex``."""
+        return f"{self.effect.name} {self.place}".strip()

@@ -1,0 +1,99 @@
+"""What is being identified: one arm, how it is driven, and what its recordings reach."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shared.errors import IdentificationError
+from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource
+from shared.sim.plant.plant import Control, Plant, mjcf, pr2
+from shared.sim.plant.rollouts import Recorded, Rollouts
+from shared.sim.plant.signals import Signal
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What effects and base parameters may ask about the arm before anything is simulated."""
+
+    plant: Plant
+    nominal: Rollouts
+    """The arm as the model file has it; its ``model`` has the nominal numbers."""
+    has_tracker: bool
+    has_gravity: bool
+    duration: float
+    """Of the longest trajectory (s)."""
+    command_period: float
+    """Median (s)."""
+    travel: Float64
+    """float64[J], range of each joint over all trajectories (rad, m)."""
+    speed: Float64
+    """float64[J], speed that each joint exceeds 2 % of the time (rad/s, m/s)."""
+
+    @property
+    def control(self) -> Control:
+        """Return what a command is."""
+        return self.plant.control
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Return the logged joints."""
+        return self.plant.labels
+
+
+def plant_of(dataset: Dataset, source: ModelSource | None = None) -> Plant:
+    """Return the arm that a data set is of.
+
+    Raises:
+        IdentificationError: the model does not fit the recordings.
+    """
+    source = source or dataset.source
+    if source.kind == "pr2":
+        plant = pr2(source.arm, source.parameters)
+        if dataset.control != "pose" or dataset.actuators != POSE:
+            raise IdentificationError('kind = "pr2" needs control = "pose": its controller is one')
+        if sorted(plant.labels) != sorted(dataset.joints):
+            raise IdentificationError(
+                f"a PR2's arm has the joints {', '.join(plant.labels)}; "
+                f"joints.parquet has {', '.join(dataset.joints)}"
+            )
+        return plant
+    if source.path is None:
+        raise IdentificationError('[model] kind = "mjcf" needs path, the MJCF file')
+    return mjcf(source.path, dataset.control, dataset.joints, dataset.actuators, source.tracked)
+
+
+def subject_of(dataset: Dataset, capacity: int = 128) -> Subject:
+    """Return the arm of a data set and what its recordings reach."""
+    plant = plant_of(dataset)
+    nominal = Rollouts(plant, (), capacity)
+    q = np.concatenate([each.q for each in dataset.trajectories])
+    speeds = [
+        np.abs(np.diff(each.q, axis=0)) / np.diff(each.joints_at)[:, None]
+        for each in dataset.trajectories
+    ]
+    periods = np.concatenate([np.diff(each.command_at) for each in dataset.trajectories])
+    return Subject(
+        plant=plant,
+        nominal=nominal,
+        has_tracker=dataset.has_tracker,
+        has_gravity=not nominal.is_weightless,
+        duration=max(each.duration for each in dataset.trajectories),
+        command_period=float(np.median(periods)) if len(periods) else 0.01,
+        travel=np.ptp(q, axis=0),
+        speed=np.quantile(np.concatenate(speeds), 0.98, axis=0),
+    )
+
+
+def recorded_of(dataset: Dataset) -> tuple[Recorded, ...]:
+    """Return what each trajectory is replayed from."""
+    return tuple(
+        Recorded(
+            initial_q=each.initial_q,
+            initial_qd=each.initial_qd,
+            command=Signal(each.command_at, each.command),
+            logged_q=Signal(each.joints_at, each.q),
+            joints_at=each.joints_at,
+            tracker_at=each.tracker_at,
+        )
+        for each in dataset.trajectories
+    )

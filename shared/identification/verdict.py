@@ -1,0 +1,147 @@
+"""What identification says at the end: ``verdict.json``, for programs and for the report."""
+
+from typing import Literal
+
+import msgspec
+
+SCHEMA = 1
+"""Of ``verdict.json``."""
+Word = Literal["named", "none", "tie", "base_too_coarse", "unexplained"]
+
+
+class _Part(msgspec.Struct, frozen=True, kw_only=True):
+    """Base of every part: frozen."""
+
+
+class Interval(_Part, frozen=True, kw_only=True):
+    """95 %."""
+
+    low: float
+    high: float
+
+
+class Cause(_Part, frozen=True, kw_only=True):
+    """An effect that passed the held-out gate, or one of a tie."""
+
+    effect: str
+    where: str
+    """Joint, axis or part; empty: the whole arm."""
+    quantity: str
+    value: float
+    unit: str
+    interval: Interval
+    title: str
+    """In words."""
+    signature: str
+    others: dict[str, float] = {}
+    """Further quantities of the same effect, by name."""
+    share: float = 0.0
+    """Of the explainable held-out residual that it removes by itself."""
+    share_interval: Interval | None = None
+
+
+class Tie(_Part, frozen=True, kw_only=True):
+    """Causes that these data do not tell apart."""
+
+    causes: tuple[Cause, ...]
+    alike: float
+    """Smallest cosine between their signatures once what the base can absorb is taken out."""
+    record: str
+    """The motion that would tell them apart, in one sentence."""
+
+
+class Unexplained(_Part, frozen=True, kw_only=True):
+    """What is left over after everything that was named."""
+
+    where: str
+    """Joint, ``tracker``, or both."""
+    trajectory: str
+    begin: float
+    """(s)."""
+    end: float
+    """(s)."""
+    phase: str
+    """In words: ``after reversals``, ``while fast``, ``once``, ``throughout``."""
+    size: float
+    """Root mean square there."""
+    unit: str
+    times_noise: float
+    """Size in units of the noise floor."""
+
+
+class HeldOut(_Part, frozen=True, kw_only=True):
+    """Root-mean-square residual on held-out trajectories, in units of the noise floor (1 = noise).
+
+    ``tracker_mm`` and ``joints_mrad`` are the same in plain units, by stage.
+    """
+
+    nominal: float
+    base_fit: float
+    extended: float
+    noise_floor: float
+    share_removed: float
+    """(base_fit^2 - extended^2) / (base_fit^2 - noise_floor^2)."""
+    share_interval: Interval
+    joints_mrad: dict[str, float]
+    """Keys ``nominal``, ``base_fit``, ``extended``, ``noise_floor``; mm for sliding joints."""
+    tracker_mm: dict[str, float] = {}
+
+
+class Scored(_Part, frozen=True, kw_only=True):
+    """A candidate as it was looked at."""
+
+    effect: str
+    where: str
+    screen: float
+    """Share of the training residual that it takes off once the base's share is taken out."""
+    gain: float | None = None
+    """Held-out loss that it takes off when refitted; None where it was not refitted."""
+    gain_interval: Interval | None = None
+    value: float | None = None
+    unit: str = ""
+    why_not: str = ""
+    """In words, of those that were not named."""
+
+
+class BaseValue(_Part, frozen=True, kw_only=True):
+    """A parameter of the base model before and after."""
+
+    name: str
+    unit: str
+    nominal: float
+    base_fit: float
+    extended: float
+    interval: Interval
+
+
+class Verdict(_Part, frozen=True, kw_only=True):
+    """All of it."""
+
+    schema: int = SCHEMA
+    verdict: Word
+    sentence: str
+    """The verdict for people, in one or two sentences."""
+    causes: tuple[Cause, ...]
+    """In the order in which they were found, largest first; empty unless ``named``."""
+    ties: tuple[Tie, ...]
+    unexplained: tuple[Unexplained, ...]
+    held_out: HeldOut
+    candidates: tuple[Scored, ...]
+    """Best first."""
+    ruled_out: dict[str, str]
+    """Effects that could not be looked for, and why."""
+    base: tuple[BaseValue, ...]
+    caveats: tuple[str, ...]
+    record_next: tuple[str, ...]
+    """What to record next, best first, a sentence each."""
+    starts_agree: bool
+    """Whether base fits from several starts met."""
+    dataset: str
+    """SHA-256."""
+    model: str
+    seed: int
+    version: str
+    commit: str
+    cpu_s: float
+    seconds: dict[str, float]
+    """CPU seconds by stage."""

@@ -1,0 +1,259 @@
+"""A robot arm as MJCF: joints by name, a command per actuator, and where a tracker sits.
+
+Built of a PR2's arm with its bat, or of any MJCF file whose logged joints are hinges or slides.
+Contacts are off: what touches an arm is looked for as an effect, not modelled.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import mujoco
+
+from shared.errors import IdentificationError
+from shared.sim.build import AGENTS, build_spec
+from shared.sim.config import SimConfig
+from shared.sim.parameters import CommandParameters, load_parameters
+
+Control = Literal["pose", "position", "torque"]
+TOOL = "riposte/tool"
+"""Prefix of the sensors that say where the tracked site is."""
+_AGENT = AGENTS[1]
+_JOINTS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+PR2_TIMESTEP = 0.002
+"""Of identification, where training takes 10 ms (s)."""
+
+
+@dataclass(frozen=True)
+class Plant:
+    """What a simulation of one arm is made of; build one with :func:`pr2` or :func:`mjcf`."""
+
+    make: Callable[[], mujoco.MjSpec]
+    """Returns the arm anew, uncompiled, for somebody to change."""
+    control: Control
+    joints: tuple[str, ...]
+    """In the MJCF, in the order of the logged ones."""
+    labels: tuple[str, ...]
+    """What the log calls them."""
+    actuators: tuple[str, ...]
+    """In the MJCF, in the order of the command's columns; four for a pose."""
+    timestep: float
+    """(s)."""
+    base_body: str
+    """What the arm stands on."""
+    tool_body: str
+    """What the tracker and the payload are fixed to."""
+    command: CommandParameters = field(default_factory=CommandParameters)
+    """What is known to lie between a command and the controller."""
+
+    def mj_joint(self, label: str) -> str:
+        """Return the MJCF's name of a logged joint."""
+        return self.joints[self.labels.index(label)]
+
+
+def pr2(
+    arm: Literal["right", "left"], parameters: Path | None, timestep: float = PR2_TIMESTEP
+) -> Plant:
+    """Return one arm of a PR2 with its bat, under its Jacobian-transpose pose controller.
+
+    Args:
+        arm: which.
+        parameters: a ``model.toml``; None is the nominal model.
+        timestep: of the physics (s).
+
+    Raises:
+        ConfigError: the model file cannot be used.
+    """
+    values = load_parameters("nominal" if parameters is None else parameters)
+    cfg = SimConfig(physics_timestep=timestep, arms=(arm, arm))
+
+    def make() -> mujoco.MjSpec:
+        spec = build_spec(cfg, values, (_AGENT,))
+        for sensor in list(spec.sensors):
+            spec.delete(sensor)
+        _track(spec, mujoco.mjtObj.mjOBJ_SITE, f"{_AGENT}/tool", f"{_AGENT}/torso")
+        return spec
+
+    labels = tuple(values.joints.__struct_fields__)
+    return Plant(
+        make=make,
+        control="pose",
+        joints=tuple(f"{_AGENT}/{name}" for name in labels),
+        labels=labels,
+        actuators=tuple(f"{_AGENT}/{name}" for name in ("x", "y", "z", "orientation")),
+        timestep=timestep,
+        base_body=f"{_AGENT}/torso",
+        tool_body=f"{_AGENT}/wrist_roll",
+        command=values.command,
+    )
+
+
+def mjcf(
+    path: Path, control: Control, joints: Sequence[str], actuators: Sequence[str], tracked: str
+) -> Plant:
+    """Return the arm of an MJCF file.
+
+    Args:
+        path: the file.
+        control: what the command's columns are.
+        joints: the logged ones.
+        actuators: the command's columns, each the name of an actuator or of a joint.
+        tracked: site or body that a tracker is fixed to; empty: the last joint's body.
+
+    Raises:
+        IdentificationError: the file cannot be used, or does not have what the log names.
+    """
+    text = _read(path)
+
+    def read() -> mujoco.MjSpec:
+        kind: Any = mujoco.MjSpec  # its stub lacks the two
+        return kind.from_string(text) if text else kind.from_file(str(path))
+
+    try:
+        spec = read()
+        compiled = spec.compile()
+    except ValueError as error:
+        raise IdentificationError(f"MuJoCo refused {path}: {error}") from None
+    known = {compiled.joint(index).name: index for index in range(compiled.njnt)}
+    for name in joints:
+        if name not in known:
+            raise IdentificationError(
+                f"{path} has no joint {name!r}, which the log has; it has: {', '.join(known)}"
+            )
+        if compiled.jnt_type[known[name]] not in _JOINTS:
+            raise IdentificationError(f"{path}: joint {name!r} is no hinge or slide")
+    if missing := [name for name in known if name not in joints]:
+        raise IdentificationError(
+            f"joints.parquet lacks {', '.join(missing)}, which {path} has: "
+            "log every joint, or take it out of the MJCF"
+        )
+    drives = _drives(compiled, control, joints, actuators, path)
+    last = compiled.jnt_bodyid[known[joints[-1]]]
+    site_names = [compiled.site(index).name for index in range(compiled.nsite)]
+    body_names = [compiled.body(index).name for index in range(compiled.nbody)]
+    if tracked and tracked not in site_names and tracked not in body_names:
+        raise IdentificationError(f"{path} has no site or body {tracked!r} for the tracker")
+    names = _Names(spec, compiled)
+    tool = names.body(
+        int(compiled.site(tracked).bodyid[0]) if tracked in site_names
+        else compiled.body(tracked).id if tracked else int(last)
+    )  # fmt: skip
+    kind = mujoco.mjtObj.mjOBJ_SITE if tracked in site_names else mujoco.mjtObj.mjOBJ_XBODY
+
+    def make() -> mujoco.MjSpec:
+        spec = read()
+        for index, body in enumerate(spec.bodies):
+            if not body.name:
+                body.name = f"body {index}"
+        for sensor in list(spec.sensors):
+            spec.delete(sensor)
+        for key in list(spec.keys):
+            spec.delete(key)
+        if drives.own:
+            for actuator in list(spec.actuators):
+                spec.delete(actuator)
+            for name in joints:
+                motor = spec.add_actuator(name=name, target=name)
+                motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
+                motor.set_to_motor()
+        spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+        spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+        spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        _track(spec, kind, tracked or tool, "")
+        return spec
+
+    return Plant(
+        make=make,
+        control=control,
+        joints=tuple(joints),
+        labels=tuple(joints),
+        actuators=drives.names,
+        timestep=float(compiled.opt.timestep),
+        base_body=names.body(_root(compiled, int(last))),
+        tool_body=tool,
+    )
+
+
+@dataclass(frozen=True)
+class _Drives:
+    names: tuple[str, ...]
+    own: bool
+    """Whether the file's actuators give way to one motor a joint."""
+
+
+class _Names:
+    """Names of an MJCF's bodies, made up where it has none."""
+
+    def __init__(self, spec: mujoco.MjSpec, compiled: mujoco.MjModel) -> None:
+        self._given = [compiled.body(index).name for index in range(compiled.nbody)]
+        self._count = len(list(spec.bodies))
+
+    def body(self, index: int) -> str:
+        return self._given[index] or f"body {index}"
+
+
+def _read(path: Path) -> str:
+    """Return the MJCF's text, empty where it refers to other files and is read from its place."""
+    try:
+        text = path.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise IdentificationError(f"cannot read the MJCF {path}: {reason}") from None
+    return "" if any(word in text for word in ("file=", "<include", "meshdir")) else text
+
+
+def _drives(
+    compiled: mujoco.MjModel,
+    control: Control,
+    joints: Sequence[str],
+    columns: Sequence[str],
+    path: Path,
+) -> _Drives:
+    """Return which actuator each column of the command drives."""
+    if control == "pose":
+        raise IdentificationError('control = "pose" needs [model] kind = "pr2"')
+    names = [compiled.actuator(index).name for index in range(compiled.nu)]
+    targets: dict[str, str] = {}
+    for index in range(compiled.nu):
+        if compiled.actuator_trntype[index] == mujoco.mjtTrn.mjTRN_JOINT:
+            joint = compiled.joint(int(compiled.actuator_trnid[index, 0])).name
+            targets[joint] = names[index]
+    has_position = all(compiled.actuator_biastype[:] == mujoco.mjtBias.mjBIAS_AFFINE)
+    found = [name if name in names else targets.get(name, "") for name in columns]
+    if control == "torque" and (not compiled.nu or has_position):
+        if sorted(columns) != sorted(joints):
+            raise IdentificationError(
+                f"{path} has no motors, so command.parquet needs a column for each joint "
+                f"({', '.join(joints)}); it has {', '.join(columns)}"
+            )
+        return _Drives(tuple(columns), own=True)
+    if not all(found) or len(set(found)) < len(found):
+        lost = [name for name, match in zip(columns, found, strict=True) if not match]
+        raise IdentificationError(
+            f"{path} has no actuator for the command's column {', '.join(lost) or columns}; "
+            f"it has: {', '.join(names) or 'none'}"
+        )
+    if control == "position" and not has_position:
+        raise IdentificationError(
+            f'{path}: control = "position" needs position actuators, this one has motors'
+        )
+    return _Drives(tuple(found), own=False)
+
+
+def _root(compiled: mujoco.MjModel, body: int) -> int:
+    """Return the first body below the world that carries a body."""
+    while compiled.body_parentid[body]:
+        body = int(compiled.body_parentid[body])
+    return body
+
+
+def _track(spec: mujoco.MjSpec, kind: mujoco.mjtObj, name: str, frame: str) -> None:
+    """Add sensors of a pose, in a site's frame or in the world's."""
+    for part, sensor in (
+        ("position", mujoco.mjtSensor.mjSENS_FRAMEPOS),
+        ("quaternion", mujoco.mjtSensor.mjSENS_FRAMEQUAT),
+    ):
+        made = spec.add_sensor(name=f"{TOOL}/{part}", type=sensor, objtype=kind, objname=name)
+        if frame:
+            made.reftype, made.refname = mujoco.mjtObj.mjOBJ_SITE, frame

@@ -1,0 +1,246 @@
+"""Many arms at once, each with a model, a command and reports of its own."""
+
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import mujoco.batch
+import numpy as np
+
+from shared.sim.arm import Float64
+from shared.sim.model import silence
+from shared.sim.plant.plant import TOOL, Plant
+from shared.sim.plant.row import JointsReport, Row, Step, TorqueLaw, TrackerReport
+from shared.sim.plant.signals import Signal, filtered, sampled, sampled_poses
+from shared.sim.plant.structure import Structure, compiled
+
+_CHUNK = 250
+"""Steps that a batch takes between two looks at what it recorded."""
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What an arm is to replay, and when it is to report."""
+
+    initial_q: Float64
+    """float64[J]."""
+    initial_qd: Float64
+    """float64[J]."""
+    command: Signal
+    logged_q: Signal
+    joints_at: Float64
+    """float64[T] (s)."""
+    tracker_at: Float64 | None
+    """float64[K] on the tracker's clock (s)."""
+
+
+@dataclass(frozen=True)
+class Reports:
+    """What one arm would have logged."""
+
+    q: Float64
+    """float64[T, J]; NaN from where the physics diverged."""
+    tracker: Float64 | None
+    """float64[K, 7]."""
+
+
+Entry = Callable[[Row], None]
+"""Lets base parameters and effects into one arm."""
+
+
+class Rollouts:
+    """Arms of one structure, kept compiled."""
+
+    def __init__(self, plant: Plant, structure: Structure, capacity: int) -> None:
+        """Compile it.
+
+        Args:
+            plant: the arm.
+            structure: what effects have added to it.
+            capacity: the most arms at once.
+        """
+        silence()
+        self.plant = plant
+        self.capacity = capacity
+        self.model = compiled(plant, structure)
+        self._joints = [self.model.joint(name) for name in plant.joints]
+        self._qpos = np.array([int(joint.qposadr[0]) for joint in self._joints])
+        self._dofs = np.array([int(joint.dofadr[0]) for joint in self._joints])
+        self._batch = mujoco.batch.Batch(self.model, nsim=capacity, nthread=1)
+        self._expanded: dict[str, Float64] = {}
+        self._stale: set[str] = set()
+        self._needs_constants = False
+        adr = int(self.model.sensor(f"{TOOL}/position").adr[0])
+        self._tool = slice(adr, adr + 7)
+
+    @property
+    def is_weightless(self) -> bool:
+        """Whether gravity moves nothing of the arm."""
+        off = int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+        return bool(self.model.opt.disableflags & off) or not self.model.opt.gravity.any()
+
+    def run(self, work: Sequence[tuple[Entry, Recorded]]) -> list[Reports]:
+        """Replay recordings, each on an arm of its own; any number of them."""
+        out: list[Reports] = []
+        for begin in range(0, len(work), self.capacity):
+            out += self._run(work[begin : begin + self.capacity])
+        return out
+
+    def _run(self, work: Sequence[tuple[Entry, Recorded]]) -> list[Reports]:
+        rows = [self._row(index, entry, recorded) for index, (entry, recorded) in enumerate(work)]
+        self._restore(rows)
+        ids = np.arange(len(rows))
+        self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
+        qpos, qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
+        for row, (_, recorded) in zip(rows, work, strict=True):
+            qpos[row.index, self._qpos] = recorded.initial_q
+            qvel[row.index, self._dofs] = recorded.initial_qd
+        timestep = self.plant.timestep
+        steps = int(np.ceil(max(row.duration for row in rows) / timestep)) + 1
+        wants_tool = any(recorded.tracker_at is not None for _, recorded in work)
+        q = np.empty((len(rows), steps + 1, len(self._qpos)))
+        tool = np.empty((len(rows), steps + 1, 7)) if wants_tool else None
+        q[:, 0] = qpos[ids][:, self._qpos]
+        laws = _by_law(rows)
+        at: Float64 = timestep * np.arange(steps, dtype=np.float64)
+        for begin in range(0, steps, _CHUNK):
+            end = min(begin + _CHUNK, steps)
+            ctrl = np.stack([row.command.held(at[begin:end]) for row in rows])
+            found = self._closed(ids, ctrl, laws, begin) if laws else self._open(ids, ctrl)
+            q[:, begin + 1 : end + 1] = found[0]
+            if tool is not None:  # sensors say where the tool was before the step
+                tool[:, begin:end] = found[1]
+        times: Float64 = timestep * np.arange(steps + 1, dtype=np.float64)
+        is_bad = self._batch.warning[ids].reshape(len(ids), -1).any(axis=1)
+        return [
+            self._reports(row, recorded, times, q[row.index],
+                          None if tool is None else tool[row.index, :-1], bool(is_bad[row.index]))
+            for row, (_, recorded) in zip(rows, work, strict=True)
+        ]  # fmt: skip
+
+    def _row(self, index: int, entry: Entry, recorded: Recorded) -> Row:
+        last = float(recorded.joints_at[-1])
+        if recorded.tracker_at is not None:
+            last = max(last, float(recorded.tracker_at[-1]))
+        row = Row(
+            plant=self.plant,
+            model=self.model,
+            index=index,
+            command=recorded.command,
+            logged_q=recorded.logged_q,
+            duration=last,
+        )
+        entry(row)
+        known = self.plant.command
+        if not known.is_direct:
+            row.command = filtered(row.command.later(known.delay), known.filter, last)
+        return row
+
+    def _restore(self, rows: Sequence[Row]) -> None:
+        """Give every arm its own model, and the nominal one where it asked for nothing."""
+        wanted = {name for row in rows for name in row.fields}
+        for name in wanted - self._expanded.keys():
+            self._expanded[name] = self._batch.expand(name)
+        for name in wanted | self._stale:
+            values = self._expanded[name]
+            owner = self.model.opt if name.startswith("opt.") else self.model
+            values[:] = getattr(owner, name.removeprefix("opt."))
+            for row in rows:
+                if name in row.fields:
+                    values[row.index] = row.fields[name].reshape(values[row.index].shape)
+        self._stale = wanted
+        if wanted & _CONSTANTS or self._needs_constants:
+            self._batch.set_const(np.arange(len(rows)))
+        self._needs_constants = bool(wanted & _CONSTANTS)
+
+    def _open(self, ids: np.ndarray, ctrl: Float64) -> tuple[Float64, Float64]:
+        found = self._batch.rollout(
+            ctrl.shape[1], control=ctrl, record=("qpos", "sensordata"), ids=ids
+        )
+        return found["qpos"][:, :, self._qpos], found["sensordata"][:, :, self._tool]
+
+    def _closed(
+        self, ids: np.ndarray, ctrl: Float64, laws: "list[_Active]", begin: int
+    ) -> tuple[Float64, Float64]:
+        batch = self._batch
+        qpos, qvel, control = batch.bind("qpos"), batch.bind("qvel"), batch.bind("ctrl")
+        applied, drive = batch.bind("qfrc_applied"), batch.bind("qfrc_actuator")
+        bias, sensors = batch.bind("qfrc_bias"), batch.bind("sensordata")
+        count = ctrl.shape[1]
+        q = np.empty((len(ids), count, len(self._qpos)))
+        tool = np.empty((len(ids), count, 7))
+        for index in range(count):
+            control[ids] = ctrl[:, index]
+            applied[ids] = 0.0
+            for active in laws:
+                pick = np.ix_(active.rows, self._dofs)
+                step = Step(
+                    time=(begin + index) * self.plant.timestep,
+                    timestep=self.plant.timestep,
+                    q=qpos[np.ix_(active.rows, self._qpos)],
+                    qd=qvel[pick],
+                    drive=drive[pick],
+                    gravity=bias[pick],
+                )
+                applied[pick] += active.law(step, active.values, active.memory)
+            batch.step(ids)
+            q[:, index] = qpos[np.ix_(ids, self._qpos)]
+            tool[:, index] = sensors[ids][:, self._tool]
+        return q, tool
+
+    def _reports(
+        self, row: Row, recorded: Recorded, times: Float64, q: Float64, tool: Float64 | None,
+        is_bad: bool,
+    ) -> Reports:  # fmt: skip
+        joints = JointsReport(recorded.joints_at, sampled(times, q, recorded.joints_at))
+        for change in row.joints_reports:
+            change(joints)
+        if is_bad:
+            joints.q = np.full_like(joints.q, np.nan)
+        if recorded.tracker_at is None or tool is None:
+            return Reports(joints.q, None)
+        at = recorded.tracker_at
+        at = at if row.tracker_time is None else row.tracker_time(at)
+        report = TrackerReport(recorded.tracker_at, sampled_poses(times[:-1], tool, at))
+        for change in row.tracker_reports:
+            change(report)
+        if is_bad:
+            report.pose = np.full_like(report.pose, np.nan)
+        return Reports(joints.q, report.pose)
+
+
+@dataclass
+class _Active:
+    law: TorqueLaw
+    rows: np.ndarray
+    values: Float64
+    memory: Float64
+
+
+def _by_law(rows: Sequence[Row]) -> list[_Active]:
+    """Return the laws at work, each with the arms that it acts on; at most once an arm."""
+    groups: dict[tuple[TorqueLaw, int], list[tuple[int, Float64]]] = defaultdict(list)
+    for row in rows:
+        seen: dict[TorqueLaw, int] = defaultdict(int)
+        for law, values in row.laws:
+            groups[law, seen[law]].append((row.index, values))
+            seen[law] += 1
+    return [
+        _Active(
+            law,
+            np.array([index for index, _ in group]),
+            np.stack([values for _, values in group]),
+            np.zeros((len(group), law.memory)),
+        )
+        for (law, _), group in groups.items()
+    ]
+
+
+_CONSTANTS = frozenset(
+    {
+        "body_mass", "body_inertia", "body_ipos", "body_iquat", "body_pos", "body_quat",
+        "dof_armature", "qpos0", "qpos_spring", "jnt_pos", "jnt_axis", "body_gravcomp",
+    }
+)  # fmt: skip
+"""Fields that others are derived from."""

@@ -1,0 +1,150 @@
+"""One arm of a batch, as an effect gets it to change: its model, its command, its reports."""
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import mujoco
+import numpy as np
+
+from shared.sim.arm import Float64
+from shared.sim.plant.plant import Plant
+from shared.sim.plant.signals import Signal
+
+
+@dataclass
+class Step:
+    """What a torque law may look at, K arms at once; views, not to be kept."""
+
+    time: float
+    """(s)."""
+    timestep: float
+    """(s)."""
+    q: Float64
+    """float64[K, J], logged joints as they are (rad, m)."""
+    qd: Float64
+    """float64[K, J] (rad/s, m/s)."""
+    drive: Float64
+    """float64[K, J], what the actuators put on the joints (N m, N), of the last step."""
+    gravity: Float64
+    """float64[K, J], gravity, centrifugal and Coriolis torque that the drive has to hold."""
+
+
+class TorqueLaw(Protocol):
+    """A torque that depends on what the arm does; stateless but for its memory."""
+
+    memory: int
+    """Numbers that it keeps for each arm from step to step, 0 at the start."""
+
+    def __call__(self, step: Step, values: Float64, memory: Float64) -> Float64:
+        """Return float64[K, J] to be added at the joints (N m, N).
+
+        Args:
+            step: the state.
+            values: float64[K, P], what the effect gave to :meth:`Row.torque`.
+            memory: float64[K, M], to be changed in place.
+        """
+        ...
+
+
+@dataclass
+class JointsReport:
+    """What the robot would log."""
+
+    at: Float64
+    """float64[T] (s)."""
+    q: Float64
+    """float64[T, J]."""
+
+
+@dataclass
+class TrackerReport:
+    """What a tracker would log."""
+
+    at: Float64
+    """float64[K] on the tracker's clock (s)."""
+    pose: Float64
+    """float64[K, 7] in the base frame."""
+
+
+@dataclass
+class Row:
+    """One arm that replays one trajectory."""
+
+    plant: Plant
+    model: mujoco.MjModel
+    """Of the batch: names, sizes and nominal values; never changed."""
+    index: int
+    command: Signal
+    """Replace it to change what reaches the controller; instants are the log's (s)."""
+    logged_q: Signal
+    """What the robot logged, for effects on how commands were understood."""
+    duration: float
+    """(s)."""
+    tracker_time: Callable[[Float64], Float64] | None = None
+    """Turns instants of the tracker's clock into true ones, if it is not right."""
+    joints_reports: list[Callable[[JointsReport], None]] = dataclasses.field(
+        default_factory=list[Callable[[JointsReport], None]]
+    )
+    tracker_reports: list[Callable[[TrackerReport], None]] = dataclasses.field(
+        default_factory=list[Callable[[TrackerReport], None]]
+    )
+    laws: list[tuple[TorqueLaw, Float64]] = dataclasses.field(
+        default_factory=list[tuple[TorqueLaw, Float64]]
+    )
+    fields: dict[str, Float64] = dataclasses.field(default_factory=dict[str, Float64])
+
+    def field(self, name: str) -> Float64:
+        """Return a field of this arm's own model, to be changed in place."""
+        if name not in self.fields:
+            owner = self.model.opt if name.startswith("opt.") else self.model
+            self.fields[name] = np.array(getattr(owner, name.removeprefix("opt.")), np.float64)
+        return self.fields[name]
+
+    def dof(self, label: str) -> int:
+        """Return the index of a logged joint's velocity in the model."""
+        return int(self.model.joint(self.plant.mj_joint(label)).dofadr[0])
+
+    def mj_joint(self, name: str) -> int:
+        """Return the index of a joint of the MJCF, added ones included."""
+        return int(self.model.joint(name).id)
+
+    def body_of(self, label: str) -> int:
+        """Return the index of the body that a logged joint carries."""
+        return int(self.model.jnt_bodyid[self.mj_joint(self.plant.mj_joint(label))])
+
+    def tool_body(self) -> int:
+        """Return the index of the body that the tracker is fixed to."""
+        return int(self.model.body(self.plant.tool_body).id)
+
+    def actuator(self, index: int) -> int:
+        """Return the model's index of the actuator behind a column of the command."""
+        return int(self.model.actuator(self.plant.actuators[index]).id)
+
+    def drives_of(self, label: str) -> list[int]:
+        """Return the actuators that act on one logged joint alone; none for a pose."""
+        joint = self.mj_joint(self.plant.mj_joint(label))
+        kinds, targets = self.model.actuator_trntype, self.model.actuator_trnid
+        return [
+            index
+            for index in range(self.model.nu)
+            if kinds[index] == mujoco.mjtTrn.mjTRN_JOINT and targets[index, 0] == joint
+        ]
+
+    def torque(self, law: TorqueLaw, values: Float64) -> None:
+        """Let a law act on this arm: float64[P] are its parameters."""
+        self.laws.append((law, np.asarray(values, np.float64)))
+
+    def on_joints(self, change: Callable[[JointsReport], None]) -> None:
+        """Change what the robot logs of its joints."""
+        self.joints_reports.append(change)
+
+    def on_tracker(self, change: Callable[[TrackerReport], None]) -> None:
+        """Change what the tracker logs."""
+        self.tracker_reports.append(change)
+
+    def warp_tracker(self, change: Callable[[Float64], Float64]) -> None:
+        """Turn instants of the tracker's clock into true ones, on top of what others turn."""
+        before = self.tracker_time
+        self.tracker_time = change if before is None else lambda at: change(before(at))

@@ -1,0 +1,89 @@
+"""Signals over time: a command as a controller gets it, a pose as a tracker sees it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shared.sim.arm import Float64
+from shared.sim.servo import CYCLE
+
+POSE = 7
+"""Numbers of a pose: position (m) and quaternion (w, x, y, z)."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Values that each hold from their instant to the next."""
+
+    at: Float64
+    """float64[C] (s), rising."""
+    values: Float64
+    """float64[C, U]."""
+
+    def held(self, at: Float64) -> Float64:
+        """Return float64[T, U], the values in force at instants; the first one before its time."""
+        index = np.searchsorted(self.at, at + 1e-9, side="right") - 1
+        return self.values[np.maximum(index, 0)]
+
+    def later(self, seconds: float) -> "Signal":
+        """Return the signal delayed; fractions of a period count."""
+        return Signal(self.at + seconds, self.values)
+
+
+def filtered(signal: Signal, share: float, until: float) -> Signal:
+    """Return what the PR2 controller's command filter makes of poses, once per 1 ms cycle.
+
+    Args:
+        signal: float64[C, 7] poses.
+        share: of the remaining way per cycle (``pose_command_filter``), 1 is off.
+        until: when the result may end (s).
+    """
+    if share >= 1.0:
+        return signal
+    at: Float64 = CYCLE * np.arange(int(until / CYCLE) + 2, dtype=np.float64)
+    targets = signal.held(at)
+    changes = np.flatnonzero(np.any(np.diff(targets, axis=0) != 0.0, axis=1)) + 1
+    out = np.empty_like(targets)
+    begin, pose = 0, targets[0]
+    for end in [*changes.tolist(), len(at)]:
+        cycles: Float64 = np.arange(1, end - begin + 1, dtype=np.float64)
+        covered: Float64 = 1.0 - (1.0 - share) ** cycles
+        out[begin:end] = _between(pose, targets[begin], covered)
+        begin, pose = end, out[end - 1]
+    return Signal(at, out)
+
+
+def _between(start: Float64, end: Float64, shares: Float64) -> Float64:
+    """Return float64[K, 7]: poses on the way from one to another, on the great arc."""
+    out = start + shares[:, None] * (end - start)
+    target = -end[3:] if start[3:] @ end[3:] < 0.0 else end[3:]
+    angle = 2.0 * np.arctan2(np.linalg.norm(target - start[3:]), np.linalg.norm(target + start[3:]))
+    if angle > 1e-6:
+        out[:, 3:] = (
+            np.sin((1.0 - shares) * angle)[:, None] * start[3:]
+            + np.sin(shares * angle)[:, None] * target
+        ) / np.sin(angle)
+    else:
+        out[:, 3:] = target
+    return out
+
+
+def sampled(at: Float64, values: Float64, wanted: Float64) -> Float64:
+    """Return float64[K, D]: values between instants on a straight line; the ends hold."""
+    index = np.clip(np.searchsorted(at, wanted, side="right") - 1, 0, len(at) - 2)
+    span = at[index + 1] - at[index]
+    share = np.clip((wanted - at[index]) / span, 0.0, 1.0)[:, None]
+    return values[index] + share * (values[index + 1] - values[index])
+
+
+def sampled_poses(at: Float64, poses: Float64, wanted: Float64) -> Float64:
+    """Return float64[K, 7]: poses between instants; quaternions on the short way round."""
+    index = np.clip(np.searchsorted(at, wanted, side="right") - 1, 0, len(at) - 2)
+    share = np.clip((wanted - at[index]) / (at[index + 1] - at[index]), 0.0, 1.0)[:, None]
+    start, end = poses[index], poses[index + 1].copy()
+    end[:, 3:] *= np.where(np.einsum("ij,ij->i", start[:, 3:], end[:, 3:]) < 0.0, -1.0, 1.0)[
+        :, None
+    ]
+    out = start + share * (end - start)
+    out[:, 3:] /= np.linalg.norm(out[:, 3:], axis=1, keepdims=True)
+    return out
