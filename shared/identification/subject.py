@@ -20,6 +20,8 @@ class Subject:
     """The arm as the model file has it; its ``model`` has the nominal numbers."""
     has_tracker: bool
     has_gravity: bool
+    trajectories: tuple[str, ...]
+    """Names."""
     duration: float
     """Of the longest trajectory (s)."""
     command_period: float
@@ -77,6 +79,7 @@ def subject_of(dataset: Dataset, capacity: int = 128) -> Subject:
         nominal=nominal,
         has_tracker=dataset.has_tracker,
         has_gravity=not nominal.is_weightless,
+        trajectories=tuple(each.name for each in dataset.trajectories),
         duration=max(each.duration for each in dataset.trajectories),
         command_period=float(np.median(periods)) if len(periods) else 0.01,
         travel=np.ptp(q, axis=0),
@@ -94,6 +97,7 @@ def recorded_of(dataset: Dataset) -> tuple[Recorded, ...]:
             logged_q=Signal(each.joints_at, each.q),
             joints_at=each.joints_at,
             tracker_at=each.tracker_at,
+            trajectory=each.name,
         )
         for each in dataset.trajectories
     )

@@ -33,6 +33,10 @@ class Recorded:
     """float64[T] (s)."""
     tracker_at: Float64 | None
     """float64[K] on the tracker's clock (s)."""
+    trajectory: str = ""
+    """Name of the recording that it is, or is a part of."""
+    begin: float = 0.0
+    """How far into the recording time 0 is (s)."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +134,8 @@ class Rollouts:
             command=recorded.command,
             logged_q=recorded.logged_q,
             duration=last,
+            trajectory=recorded.trajectory,
+            begin=recorded.begin,
         )
         entry(row)
         known = self.plant.command

@@ -82,6 +82,10 @@ class Row:
     """What the robot logged, for effects on how commands were understood."""
     duration: float
     """(s)."""
+    trajectory: str
+    """Name of the recording."""
+    begin: float
+    """How far into the recording time 0 is (s)."""
     tracker_time: Callable[[Float64], Float64] | None = None
     """Turns instants of the tracker's clock into true ones, if it is not right."""
     joints_reports: list[Callable[[JointsReport], None]] = dataclasses.field(
