@@ -9,26 +9,16 @@ import rerun as rr
 
 from shared.messages.message import Array
 from shared.telemetry import recording as paths
+from shared.telemetry.drawer import ALL, TARGET_COLOURS, WORLD, Drawer, TimesOf, loop_times
 from shared.telemetry.recording import Recording
 from shared.telemetry.scene import JOINTS, Scene, Shape
 
 COLOURS = {"antagonist": (232, 93, 54), "protagonist": (64, 132, 214)}
 """Who is who, in every view and figure."""
-TARGET_COLOURS = {
-    "free": (255, 190, 70, 70),
-    "scores": (60, 210, 110, 130),
-    "penalty": (235, 40, 60, 150),
-    "guarded": (64, 132, 214, 110),
-}
-"""The target's colour says what the rule book makes of this instant."""
 BATS_COLOUR = (170, 100, 200)
 FLOOR_COLOUR = (58, 62, 72)
-WORLD = "world"
-"""The body that everything stands on."""
 JOINTS_EVERY = 2
 """Joint angles are for the file only, and there in every second row: the poses say the rest."""
-STILL = 1e-5
-"""A pose that changed less than this (m, or quaternion) is not sent again."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -119,98 +109,35 @@ class BoutDrawer:
     """Sends rows of bouts to one place, leaving out what has not changed since the last rows."""
 
     def __init__(self, recording: Recording, scene: Scene, to: Literal["file", "live"]) -> None:
-        self._recording = recording
+        self._drawer = Drawer(recording, scene, to)
         self._scene = scene
-        self._to: Literal["file", "live"] = to
-        self._poses: Array | None = None
-        self._states: dict[str, str] = {}
+        self._has_joints = to == "file"
 
     def draw(self, rows: BoutRows) -> None:
         """Send F rows; F may be 0."""
         if len(rows) == 0:
             return
-        self._bodies(rows)
-        times = self._times(rows)
-        self._send(paths.BOUT_SCORE, times, rr.Scalars.columns(scalars=rows.score))
+
+        def times(kept: Array | slice) -> list[rr.TimeColumn]:
+            steps, wall_ns = rows.control_step[kept], rows.wall_ns[kept]
+            return loop_times(steps, wall_ns, self._scene.control_timestep)
+
+        drawer = self._drawer
+        drawer.bodies(times, rows.positions, rows.quaternions)
+        drawer.send(paths.BOUT_SCORE, times(ALL), rr.Scalars.columns(scalars=rows.score))
         for a, agent in enumerate(self._scene.agents):
-            if self._to == "file":
-                self._joints(rows, a, agent)
+            if self._has_joints:
+                self._joints(rows, times, a, agent)
             inside = np.where(rows.in_target[:, a], "in target", "")
-            self._state(paths.in_target_path(agent), rows, inside)
-        self._state(paths.CONTACT, rows, np.where(rows.contact, "touch", ""))
-        self._target(rows)
+            drawer.state(paths.in_target_path(agent), times, inside)
+        drawer.state(paths.CONTACT, times, np.where(rows.contact, "touch", ""))
+        drawer.target(times, rows.in_target[:, 0], rows.in_target[:, 1], rows.contact)
 
-    def _bodies(self, rows: BoutRows) -> None:
-        """Send all poses as one chunk: a row names its body's frame, as robots' ``tf`` does.
-
-        A chunk for each body would cost the viewer ten times as much to take in.
-        """
-        poses = np.concatenate([rows.positions, rows.quaternions], axis=2)
-        before = poses[:1] if self._poses is None else self._poses[None]
-        moved: Array = np.any(np.abs(poses - before) > STILL, axis=(0, 2))
-        self._poses = poses[-1]
-        names = self._scene.body_names
-        bodies = [b for b, name in enumerate(names) if name != WORLD]
-        # Once a batch for those at rest, too: a viewer that comes late must find them.
-        pairs = [(k, b) for k in range(len(rows)) for b in bodies if k == 0 or moved[b]]
-        row, body = (np.array(index) for index in zip(*pairs, strict=True))
-        columns = rr.Transform3D.columns(
-            translation=rows.positions[row, body],
-            quaternion=rows.quaternions[row, body][:, [1, 2, 3, 0]],
-            child_frame=[names[b] for _, b in pairs],
-        )
-        self._send(paths.POSES, self._times(rows, row), columns)
-
-    def _joints(self, rows: BoutRows, a: int, agent: str) -> None:
+    def _joints(self, rows: BoutRows, times: TimesOf, a: int, agent: str) -> None:
         kept = np.arange(0, len(rows), JOINTS_EVERY)
-        times = self._times(rows, kept)
         for j, joint in enumerate(JOINTS):
             columns = rr.Scalars.columns(scalars=rows.joints[kept, a, j])
-            self._send(paths.joint_path(agent, joint), times, columns)
-
-    def _target(self, rows: BoutRows) -> None:
-        inside, guarded = rows.in_target[:, 0], rows.in_target[:, 1]
-        state = np.select(
-            [inside & rows.contact, inside, guarded], ["penalty", "scores", "guarded"], "free"
-        )
-        kept = self._changes(paths.TARGET, state)
-        if len(kept):
-            colours = [TARGET_COLOURS[str(state[k])] for k in kept]
-            self._send(
-                paths.TARGET, self._times(rows, kept), rr.Ellipsoids3D.columns(colors=colours)
-            )
-
-    def _state(self, path: str, rows: BoutRows, state: Array) -> None:
-        kept = self._changes(path, state)
-        if len(kept):
-            states = [str(state[k]) for k in kept]
-            self._send(path, self._times(rows, kept), rr.StateChange.columns(state=states))
-
-    def _changes(self, path: str, state: Array) -> list[int]:
-        """Return the rows at which the state differs from the one before."""
-        last = self._states.get(path)
-        kept: list[int] = []
-        for k in range(len(state)):
-            if str(state[k]) != last:
-                last = str(state[k])
-                kept.append(k)
-        self._states[path] = last or ""
-        return kept
-
-    def _times(
-        self, rows: BoutRows, kept: "list[int] | Array | None" = None
-    ) -> list[rr.TimeColumn]:
-        steps, wall = rows.control_step, rows.wall_ns
-        if kept is not None:
-            steps, wall = steps[kept], wall[kept]
-        return [
-            rr.TimeColumn(paths.CONTROL_STEP, sequence=steps),
-            rr.TimeColumn(paths.BOUT_TIME, duration=steps * self._scene.control_timestep),
-            rr.TimeColumn(paths.WALL_TIME, timestamp=wall.astype("datetime64[ns]")),
-        ]
-
-    def _send(self, path: str, times: list[rr.TimeColumn], columns: Any) -> None:
-        self._recording.columns(self._to, path, times, columns)
+            self._drawer.send(paths.joint_path(agent, joint), times(kept), columns)
 
 
 def _solid(shape: Shape, colour: tuple[int, ...]) -> Any:

@@ -6,7 +6,7 @@ Rows of the 100 Hz loop lie on ``control_step`` (ticks of robot_io, boots end to
 """
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -15,7 +15,8 @@ import rerun as rr
 from shared.messages.message import Array
 from shared.messages.training import AGENTS
 from shared.telemetry import recording as paths
-from shared.telemetry.bout import COLOURS, STILL, TARGET_COLOURS, WORLD
+from shared.telemetry.bout import COLOURS
+from shared.telemetry.drawer import ALL, Drawer, TimesOf, loop_times, wall_times
 from shared.telemetry.recording import Recording
 from shared.telemetry.scene import JOINTS, Scene
 from shared.telemetry.streams import (
@@ -152,11 +153,8 @@ class LiveDrawer:
     """Sends rows of a live bout to one place, states only where they change."""
 
     def __init__(self, recording: Recording, scene: Scene, to: Literal["file", "live"]) -> None:
-        self._recording = recording
+        self._drawer = Drawer(recording, scene, to)
         self._scene = scene
-        self._to: Literal["file", "live"] = to
-        self._poses: Array | None = None
-        self._states: dict[str, str] = {}
 
     def curves(self, rows: Mapping[str, Rows]) -> None:
         """Send every row of every stream.
@@ -168,14 +166,13 @@ class LiveDrawer:
             found = rows.get(series.stream)
             if found is None or (series.only_with and not found[series.only_with].any()):
                 continue
-            times = self._times(found)
             if series.kind == "pose":
                 position, turn = (found[name] for name in series.columns)
                 xyzw = turn[:, [1, 2, 3, 0]]
                 columns = rr.Transform3D.columns(translation=position, quaternion=xyzw)
             else:
                 columns = _scalars(found, series)
-            self._recording.columns(self._to, series.path, times, columns)
+            self._drawer.send(series.path, self._times(found)(ALL), columns)
 
     def bodies(self, arms: Rows, positions: Array, quaternions: Array) -> None:
         """Send the poses of all bodies; those of a side that no robot plays are out of sight.
@@ -185,26 +182,12 @@ class LiveDrawer:
             positions: float32[F, B, 3] (m), of these joints.
             quaternions: float32[F, B, 4], w x y z.
         """
-        names = self._scene.body_names
         placed = positions.copy()
         for agent in AGENTS:
-            ours = np.array([name.startswith(f"{agent}/") for name in names])
+            ours = np.array([name.startswith(f"{agent}/") for name in self._scene.body_names])
             absent: Array = ~arms[f"{agent}_is_there"]
             placed[absent[:, None] & ours[None]] = OUT_OF_SIGHT
-        poses = np.concatenate([placed, quaternions], axis=2)
-        before = poses[:1] if self._poses is None else self._poses[None]
-        moved: Array = np.any(np.abs(poses - before) > STILL, axis=(0, 2))
-        self._poses = poses[-1]
-        bodies = [b for b, name in enumerate(names) if name != WORLD]
-        pairs = [(k, b) for k in range(len(arms)) for b in bodies if k == 0 or moved[b]]
-        row, body = (np.array(index) for index in zip(*pairs, strict=True))
-        columns = rr.Transform3D.columns(
-            translation=placed[row, body],
-            quaternion=quaternions[row, body][:, [1, 2, 3, 0]],
-            child_frame=[names[b] for _, b in pairs],
-        )
-        times = self._times(arms.pick(row))
-        self._recording.columns(self._to, paths.POSES, times, columns)
+        self._drawer.bodies(self._times(arms), placed, quaternions)
 
     def person(self, bats: Rows, *, is_there: bool) -> None:
         """Send where the antagonist's bat is, if a person holds it.
@@ -223,7 +206,7 @@ class LiveDrawer:
             quaternion=turn[:, [1, 2, 3, 0]],
             child_frame=[PERSON_BAT] * len(rows),
         )
-        self._recording.columns(self._to, paths.POSES, self._times(rows), columns)
+        self._drawer.send(paths.POSES, self._times(rows)(ALL), columns)
 
     def states(self, rows: Mapping[str, Rows]) -> None:
         """Send where phase, gate, tracking, in target, contact and the target's colour change.
@@ -231,63 +214,33 @@ class LiveDrawer:
         Args:
             rows: by stream; all of them, for a touch may last one row.
         """
+        drawer = self._drawer
         if (said := rows.get(REFEREE.name)) is not None:
+            times = self._times(said)
             phase = np.where(np.isin(said["phase"], [*PHASES]), said["phase"], "")
-            self._state(PHASE_PATH, said, phase)
+            drawer.state(PHASE_PATH, times, phase)
             inside = [said[f"{agent}_in_target"] for agent in AGENTS]
             for agent, is_inside in zip(AGENTS, inside, strict=True):
                 state = np.where(is_inside, "in target", "")
-                self._state(paths.in_target_path(agent), said, state)
-            touch = np.where(said["contact"], "touch", "")
-            self._state(paths.CONTACT, said, touch)
-            self._target(said, inside)
+                drawer.state(paths.in_target_path(agent), times, state)
+            drawer.state(paths.CONTACT, times, np.where(said["contact"], "touch", ""))
+            drawer.target(times, inside[0], inside[1], said["contact"])
         if (gate := rows.get(GATE.name)) is not None:
             mode = np.where(np.isin(gate["mode"], [*MODES]), gate["mode"], "")
-            self._state(GATE_PATH, gate, mode)
+            drawer.state(GATE_PATH, self._times(gate), mode)
         if (bats := rows.get(BATS.name)) is not None:
             for agent in AGENTS:
                 state = np.where(bats[f"{agent}_is_valid"], "", "lost")
-                self._state(tracked_path(agent), bats, state)
+                drawer.state(tracked_path(agent), self._times(bats), state)
 
-    def _target(self, said: Rows, inside: Sequence[Array]) -> None:
-        state = np.select(
-            [inside[0] & said["contact"], inside[0], inside[1]],
-            ["penalty", "scores", "guarded"],
-            "free",
-        )
-        if kept := self._changes(paths.TARGET, state):
-            colours = [TARGET_COLOURS[str(state[k])] for k in kept]
-            times = self._times(said.pick(np.array(kept)))
-            columns = rr.Ellipsoids3D.columns(colors=colours)
-            self._recording.columns(self._to, paths.TARGET, times, columns)
+    def _times(self, rows: Rows) -> TimesOf:
+        def times(kept: Array | slice) -> list[rr.TimeColumn]:
+            wall_ns = rows[TIME][kept]
+            if LINE not in rows.columns:
+                return [wall_times(wall_ns)]
+            return loop_times(rows[LINE][kept], wall_ns, self._scene.control_timestep)
 
-    def _state(self, path: str, rows: Rows, state: Array) -> None:
-        if kept := self._changes(path, state):
-            columns = rr.StateChange.columns(state=[str(state[k]) for k in kept])
-            times = self._times(rows.pick(np.array(kept)))
-            self._recording.columns(self._to, path, times, columns)
-
-    def _changes(self, path: str, state: Array) -> list[int]:
-        """Return the rows at which the state differs from the one before."""
-        last = self._states.get(path)
-        kept: list[int] = []
-        for k, value in enumerate(state.tolist()):
-            if value != last:
-                last = value
-                kept.append(k)
-        self._states[path] = last or ""
-        return kept
-
-    def _times(self, rows: Rows) -> list[rr.TimeColumn]:
-        wall = rr.TimeColumn(paths.WALL_TIME, timestamp=rows[TIME].astype("datetime64[ns]"))
-        if LINE not in rows.columns:
-            return [wall]
-        steps = rows[LINE]
-        return [
-            rr.TimeColumn(paths.CONTROL_STEP, sequence=steps),
-            rr.TimeColumn(paths.BOUT_TIME, duration=steps * self._scene.control_timestep),
-            wall,
-        ]
+        return times
 
 
 def _scalars(rows: Rows, series: Series) -> Any:
