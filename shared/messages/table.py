@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from shared.errors import ConfigError, RiposteError
+from shared.errors import RiposteError
+from shared.messages.markdown import renewed
 from shared.messages.topics import KIB, MIB, SERVICES, TOPICS, Service, Topic
 
 BEGIN = "<!-- topics:begin -->"
@@ -25,18 +26,6 @@ _HEAD = (
 def table() -> str:
     """Return the Markdown table of every topic and service."""
     return "\n".join((*_HEAD, *map(_topic_row, TOPICS), *map(_service_row, SERVICES)))
-
-
-def renewed(text: str) -> str:
-    """Return a document with the present table between its markers.
-
-    Raises:
-        ConfigError: the markers are not there exactly once, in order.
-    """
-    begin, end = text.find(BEGIN), text.find(END)
-    if begin < 0 or end < begin or text.count(BEGIN) != 1 or text.count(END) != 1:
-        raise ConfigError(f"expected one line {BEGIN} and after it one line {END}")
-    return f"{text[: begin + len(BEGIN)]}\n{table()}\n{text[end:]}"
 
 
 def _topic_row(topic: Topic[Any]) -> str:
@@ -74,7 +63,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     path: Path = args.check or args.write
     try:
         old = path.read_text("utf-8")
-        new = renewed(old)
+        new = renewed(old, BEGIN, END, table())
         if args.write and new != old:
             path.write_text(new, "utf-8")
     except (OSError, UnicodeDecodeError, RiposteError) as error:

@@ -7,7 +7,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from shared.errors import ConfigError, RiposteError
+from shared.errors import RiposteError
+from shared.messages.markdown import renewed
 from shared.telemetry.streams import DTYPES, STREAMS
 
 BEGIN = "<!-- columns:begin -->"
@@ -30,18 +31,6 @@ def describe() -> str:
     return "\n".join(parts).rstrip()
 
 
-def renewed(text: str) -> str:
-    """Return a document with the present tables between its markers.
-
-    Raises:
-        ConfigError: the markers are not there exactly once, in order.
-    """
-    begin, end = text.find(BEGIN), text.find(END)
-    if begin < 0 or end < begin or text.count(BEGIN) != 1 or text.count(END) != 1:
-        raise ConfigError(f"expected one line {BEGIN} and after it one line {END}")
-    return f"{text[: begin + len(BEGIN)]}\n{describe()}\n{text[end:]}"
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     """Renew the tables in a document; return the exit code."""
     words = sys.argv[1:] if argv is None else argv
@@ -51,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     path = Path(words[0])
     try:
         old = path.read_text("utf-8")
-        new = renewed(old)
+        new = renewed(old, BEGIN, END, describe())
         if new != old:
             path.write_text(new, "utf-8")
     except (OSError, UnicodeDecodeError, RiposteError) as error:
