@@ -204,12 +204,21 @@ def main(argv: Sequence[str]) -> int:
     return 0 if snapshot.services else EXIT_NOBODY
 
 
-def add_bus_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what an onlooker needs to find a run: see ``bus_args``."""
+def add_bus_arguments(
+    parser: argparse.ArgumentParser,
+    run: Path | None = Path("runs/latest"),
+    about: str = "%(default)s",
+) -> None:
+    """Add what an onlooker needs to find a run: see ``bus_args``.
+
+    Args:
+        parser: of the command.
+        run: folder of the run where none is named.
+        about: says in the help which folder that is.
+    """
     parser.add_argument("site", nargs="?", type=Path, metavar="SITE", help="site file (TOML)")
     parser.add_argument(
-        "--run", type=Path, default=Path("runs/latest"), metavar="DIR",
-        help="folder of the run (%(default)s)",
+        "--run", type=Path, default=run, metavar="DIR", help=f"folder of the run ({about})"
     )  # fmt: skip
     parser.add_argument("--run-id", default="", help="name of the run on the bus")
     parser.add_argument(

@@ -16,7 +16,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from services.jobs.robot.command import PLAYED, UP, place
+from services.jobs.robot.command import place, place_arguments
 from services.robot_io.poses import Vector
 from services.robot_io.vive.calibration import (
     Calibration,
@@ -274,15 +274,7 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
         prog="riposte robot calibrate",
         description="Finds where the Vive's base stations stand to the robot of a running site.",
     )
-    parser.add_argument("site", nargs="?", type=Path, metavar="SITE", help="site file (TOML)")
-    parser.add_argument(
-        "--run", type=Path, metavar="DIR", help=f"folder of the run ({PLAYED}, or {UP})"
-    )
-    parser.add_argument("--run-id", default="", help="name of the run on the bus")
-    parser.add_argument(
-        "--connect", action="append", default=[], metavar="ENDPOINT",
-        help="bus endpoint, as in tcp/127.0.0.1:7447; may be repeated",
-    )  # fmt: skip
+    place_arguments(parser)
     parser.add_argument(
         "--poses", type=int, default=POSES, metavar="N", help="how many (%(default)s)"
     )

@@ -11,7 +11,7 @@ from typing import Literal, get_args
 
 import msgspec
 
-from services.jobs.status import OPEN_SECONDS, read_endpoint
+from services.jobs.status import OPEN_SECONDS, add_bus_arguments, read_endpoint
 from services.jobs.who import operator
 from shared.bus.base import Bus, NoAnswer, Refused
 from shared.clock import Clock, SystemClock
@@ -62,17 +62,14 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("action", choices=get_args(Action), metavar="|".join(get_args(Action)))
-    parser.add_argument("site", nargs="?", type=Path, metavar="SITE", help="site file (TOML)")
-    parser.add_argument(
-        "--run", type=Path, metavar="DIR", help=f"folder of the run ({PLAYED}, or {UP})"
-    )
-    parser.add_argument("--run-id", default="", help="name of the run on the bus")
-    parser.add_argument(
-        "--connect", action="append", default=[], metavar="ENDPOINT",
-        help="bus endpoint, as in tcp/127.0.0.1:7447; may be repeated",
-    )  # fmt: skip
+    place_arguments(parser)
     parser.add_argument("--json", action="store_true", help="one JSON object")
     return parser.parse_args(argv)
+
+
+def place_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what is needed to find robot_io: see ``place``."""
+    add_bus_arguments(parser, run=None, about=f"{PLAYED}, or {UP}")
 
 
 def place(found: argparse.Namespace) -> ServeArgs:
