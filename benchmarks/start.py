@@ -23,9 +23,8 @@ import psutil
 
 from benchmarks.harness import ROOT, median
 from services.jobs.bench import Check, Measurement
-from services.league.history import RunState
-from services.league.ledger import open_read_only
-from shared.errors import LedgerError, RiposteError
+from services.jobs.runs import state_of
+from shared.errors import ConfigError, LedgerError, RiposteError
 
 QUESTION = "start-up time and memory of each process, and seconds to the first learner update"
 FIRST_UPDATE_GOAL = 15.0
@@ -112,12 +111,9 @@ def _wait_for_updates(train: subprocess.Popen[bytes], folder: Path, updates: int
 
 def _updates(folder: Path) -> list[int]:
     """Return when each version that PPO made was entered; the warm-up's is none."""
-    if not (folder / "league.sqlite").exists():
-        return []
     try:
-        with open_read_only(folder / "league.sqlite") as ledger:
-            state = RunState.fold(ledger.replay())
-    except LedgerError:  # being made
+        state = state_of(folder)
+    except (ConfigError, LedgerError):  # not there yet, or being made
         return []
     return [v.at_ns for stage in state.stages for v in stage.versions if v.metrics is not None]
 

@@ -11,14 +11,14 @@ from typing import Any
 
 import psutil
 
+from services.jobs.runs import state_of
 from services.jobs.settings import Settings
 from services.jobs.train.command import processes
-from services.league.history import RunState, VersionRecord
-from services.league.ledger import open_read_only
+from services.league.history import VersionRecord
 from services.supervisor import ProcessSpec, Supervisor
 from shared.bus.ports import free_port
 from shared.clock import SystemClock
-from shared.errors import LedgerError, RiposteError
+from shared.errors import ConfigError, LedgerError, RiposteError
 
 POLL_SECONDS = 0.02
 START_SECONDS = 180.0
@@ -58,12 +58,9 @@ class RunReader:
 
     def newest_version(self) -> VersionRecord | None:
         """Return the antagonist's newest version in the ledger; None before there is one."""
-        if not (self.folder / "league.sqlite").exists():
-            return None
         try:
-            with open_read_only(self.folder / "league.sqlite") as ledger:
-                return RunState.fold(ledger.replay()).latest("antagonist")
-        except LedgerError:  # being made
+            return state_of(self.folder).latest("antagonist")
+        except (ConfigError, LedgerError):  # not there yet, or being made
             return None
 
 

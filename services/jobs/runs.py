@@ -9,15 +9,23 @@ from shared.errors import ConfigError
 LEDGER = "league.sqlite"
 
 
+def check_run(folder: Path) -> None:
+    """Refuse a folder that holds no run.
+
+    Raises:
+        ConfigError: it has no ledger.
+    """
+    if not (folder / LEDGER).exists():
+        raise ConfigError(f"{folder} holds no run (no {LEDGER}); give the folder of a run")
+
+
 def state_of(folder: Path) -> RunState:
     """Return what the ledger of a folder says, also while its run goes on.
 
     Raises:
         ConfigError: the folder holds no run.
-        LedgerError: its ledger is damaged, or another program's.
+        LedgerError: its ledger is damaged, or another program's, or being made.
     """
-    path = folder / LEDGER
-    if not path.exists():
-        raise ConfigError(f"{folder} holds no run (no {LEDGER}); give the folder of a run")
-    with open_read_only(path) as ledger:
+    check_run(folder)
+    with open_read_only(folder / LEDGER) as ledger:
         return RunState.fold(ledger.replay())

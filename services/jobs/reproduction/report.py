@@ -28,6 +28,7 @@ from services.jobs.reproduction.sources import (
     styles_part,
     tournament_part,
 )
+from services.jobs.runs import LEDGER, state_of
 from services.league.config import LeagueConfig
 from services.league.history import RunState
 from services.league.ledger import open_read_only
@@ -60,7 +61,7 @@ def write(folder: Path, summary: Summary, config: str) -> Reproduction | None:
 
 def gather(folder: Path, summary: Summary) -> Reproduction:
     """Return all parts of the report that have been made."""
-    with open_read_only(folder / "league.sqlite") as ledger:
+    with open_read_only(folder / LEDGER) as ledger:
         state, draws = replay(ledger.replay())
     cfg = state.config or LeagueConfig()
     missing: list[Missing] = []
@@ -161,7 +162,7 @@ def stage_times(folder: Path, summary: Summary, state: RunState) -> tuple[Stage,
     found += [Stage(name=f"round {r.round}", seconds=r.seconds) for r in summary.rounds]
     after = _pipeline_times(folder / "pipeline.json")
     if not any(stage.name == "tournament" for stage in after):
-        found += _tournament_time(folder / "tournament" / "league.sqlite")
+        found += _tournament_time(folder / "tournament")
     return (*found, *after)
 
 
@@ -173,13 +174,10 @@ def _pipeline_times(path: Path) -> tuple[Stage, ...]:
         return ()
 
 
-def _tournament_time(path: Path) -> list[Stage]:
+def _tournament_time(folder: Path) -> list[Stage]:
     """Return how long a tournament took, by its own ledger; nothing where there is none."""
-    if not path.exists():
-        return []
     try:
-        with open_read_only(path) as ledger:
-            state = RunState.fold(ledger.replay())
+        state = state_of(folder)
     except RiposteError:
         return []  # its table of bouts is there or is named as missing
     if state.evaluation_started_at_ns is None:

@@ -18,7 +18,7 @@ import msgspec
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from services.jobs.runs import state_of
+from services.jobs.runs import LEDGER, check_run, state_of
 from services.jobs.settings import Settings
 from services.jobs.tournament.files import PAGE_FILE, TABLE_FILE, write_results
 from services.jobs.tournament.plan import Plan, Pools, batch_size, check_asked
@@ -53,8 +53,7 @@ def main(argv: Sequence[str]) -> int:
     """Play a tournament, or what is left of it; return the exit code."""
     found = _parse(argv)
     run: Path = found.run
-    if not (run / "league.sqlite").exists():
-        raise ConfigError(f"{run} holds no run (no league.sqlite); give the folder of a run")
+    check_run(run)
     folder: Path = found.out or run / "tournament"
     with RunLock(folder):
         require_free_space(folder, FREE_BYTES)
@@ -127,7 +126,7 @@ def _begun(folder: Path) -> RunState | None:
     Raises:
         ConfigError: there is a run of another kind.
     """
-    if not (folder / "league.sqlite").exists():
+    if not (folder / LEDGER).exists():
         return None
     state = state_of(folder)
     if not state.position:  # stopped while it was made
@@ -167,7 +166,7 @@ def _begin(found: argparse.Namespace, run: Path, folder: Path) -> RunState:
 
 def begin_ledger(folder: Path, plan: Plan, settings: Settings) -> RunState:
     """Write the two events that a tournament begins with and return the state."""
-    ledger = Ledger(folder / "league.sqlite")
+    ledger = Ledger(folder / LEDGER)
     try:
         start = RunStarted(
             run=f"{plan.run}-tournament",
