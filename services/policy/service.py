@@ -6,7 +6,6 @@ import structlog
 
 from services.policy.acting import HOLD, Acting
 from services.policy.config import PolicyConfig
-from services.policy.lateness import Lateness
 from services.policy.loading import NamedPlayer
 from shared.bus.base import Bus
 from shared.clock import Clock
@@ -20,6 +19,7 @@ from shared.messages.play import (
 )
 from shared.messages.topics import BATS, OFFSET, PLAYER, REFEREE
 from shared.messages.training import Agent
+from shared.runtime.durations import Durations
 from shared.runtime.rate import Rate
 from shared.runtime.service import Health
 
@@ -28,6 +28,8 @@ BEHIND_SECONDS = 0.1
 bout, or of the end of a pause."""
 QUIET_SECONDS = 1.0
 """Without states for so long, the policy says whom it waits for."""
+KEPT = 1000
+"""Answers whose lateness is looked back on: 10 s at 100 Hz."""
 
 log = structlog.get_logger()
 
@@ -75,8 +77,8 @@ class Policy:
         self._boot = ""
         self._tick = -1
         self._states_at = clock.now()
-        self._took = Lateness("took_ms")
-        self._age = Lateness("age_ms")
+        self._took = Durations("took_ms_{}", KEPT)
+        self._age = Durations("age_ms_{}", KEPT)
         self._rate = Rate(clock)
         self._last_error = ""
         self._trouble = ""

@@ -14,7 +14,6 @@ from services.robot_io.gate import Gate, GateInputs, GateMemory, GateOutput, dis
 from services.robot_io.links import Floats, OtherRobot, PersonBat, RobotLink, RobotState
 from services.robot_io.poses import Pose, array_of, is_pose, pose_of
 from services.robot_io.reporting import report_of
-from services.robot_io.timing import Timing
 from services.robot_io.trackers import Tracker
 from shared.bus.base import Bus, Subscription
 from shared.clock import Clock
@@ -28,6 +27,7 @@ from shared.messages.play import (
 )
 from shared.messages.topics import ARM, ARMS, BATS, GATE, OFFSET, ROBOT
 from shared.policy.action import desired_pose
+from shared.runtime.durations import EXTREME, Durations
 from shared.runtime.service import Health
 
 ANTAGONIST, PROTAGONIST = 0, 1
@@ -35,6 +35,8 @@ REMEMBERED_TICKS = 64
 """An answer to an older tick is not used."""
 TAKE_MOST = 64
 """Messages of one kind taken at a time, so that a flood cannot hold up the loop."""
+KEPT = 6000
+"""Ticks whose lateness is looked back on: a minute at 100 Hz."""
 
 log = structlog.get_logger()
 
@@ -98,8 +100,8 @@ class RobotIo:
         self._bat = self._robot.bat
         self._tracked = parts.tracker.read(now)
         self._commanded = self._robot.tool
-        self._lateness = Timing("lateness")
-        self._answer = Timing("command")
+        self._lateness = Durations("lateness_{}_ms", KEPT, EXTREME)
+        self._answer = Durations("command_{}_ms", KEPT, EXTREME)
         self._counters = {
             "ticks": 0,
             "ticks_late": 0,
