@@ -4,7 +4,7 @@ from typing import Literal
 
 import msgspec
 
-from shared.config.ranges import check_ranges
+from shared.config.ranges import check_ordered, check_ranges
 
 Vector = tuple[float, float, float]
 
@@ -76,12 +76,7 @@ class SafetyConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
             ValueError: a value is out of its range; says which, and what is allowed.
         """
         check_ranges(self, *_RANGES)
-        for first, second in _ORDERED:
-            if getattr(self, first) > getattr(self, second):
-                raise ValueError(
-                    f"{first} ({getattr(self, first):g}) must not be above "
-                    f"{second} ({getattr(self, second):g})"
-                )
+        check_ordered(self, *_ORDERED)
         for axis, low, high in zip("xyz", self.box_low, self.box_high, strict=True):
             if not -2.0 <= low < high <= 2.0:
                 raise ValueError(

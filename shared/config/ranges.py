@@ -24,3 +24,19 @@ def check_ranges(section: object, *ranges: tuple[str, float, float]) -> None:
     """
     for name, low, high in ranges:
         check_range(name, getattr(section, name), low, high)
+
+
+def check_ordered(section: object, *pairs: tuple[str, str]) -> None:
+    """Refuse a section in which the first value of a pair is above the second.
+
+    Args:
+        section: holds the values as attributes.
+        pairs: names of both.
+
+    Raises:
+        ValueError: says which settings, and their values.
+    """
+    for first, second in pairs:
+        low, high = getattr(section, first), getattr(section, second)
+        if low > high:
+            raise ValueError(f"{first} ({low:g}) must not be above {second} ({high:g})")

@@ -12,7 +12,7 @@ import structlog
 
 from shared.bus.base import Bus
 from shared.clock import Clock
-from shared.config.ranges import check_ranges
+from shared.config.ranges import check_ordered, check_ranges
 from shared.errors import ConfigError
 from shared.messages.play import HeartRate
 from shared.messages.topics import HEART_RATE
@@ -61,11 +61,7 @@ class HeartRateConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
             ("search_seconds", 0.5, 120.0), ("retry_first", 0.05, 60.0),
             ("retry_longest", 0.05, 600.0),
         )  # fmt: skip
-        if self.retry_first > self.retry_longest:
-            raise ValueError(
-                f"retry_first ({self.retry_first:g}) must not be above "
-                f"retry_longest ({self.retry_longest:g})"
-            )
+        check_ordered(self, ("retry_first", "retry_longest"))
         if (self.source == "replay") != bool(self.file):
             raise ValueError(
                 f"source is {self.source!r} and file is {self.file!r}: "
