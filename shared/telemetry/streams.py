@@ -172,25 +172,19 @@ _AT_TICK = _time("the tick's: when the bat states of that tick were read")
 _BOOT = _text("boot", "which run of robot_io; ticks of another one begin anew")
 
 
-def _pose(side: int, agent: str, field: str, name: str, where: str) -> tuple[Column, Column]:
-    position = Column(
-        f"{agent}_{name}position",
-        "m",
-        "float",
-        f"x y z {where}",
-        _part(field, side, slice(0, 3)),
-        3,
-    )
-    orientation = Column(
-        f"{agent}_{name}orientation", "1", "float", f"quaternion w x y z {where}",
-        _part(field, side, slice(3, 7)), 4,
+def _pose(prefix: str, field: str, where: str, *side: int) -> tuple[Column, Column]:
+    """Return the columns of a pose: the first seven numbers of a field, or of a side of it."""
+    return (
+        Column(f"{prefix}position", "m", "float", f"x y z {where}".rstrip(),
+               _part(field, *side, slice(0, 3)), 3),
+        Column(f"{prefix}orientation", "1", "float", f"quaternion w x y z {where}".rstrip(),
+               _part(field, *side, slice(3, 7)), 4),
     )  # fmt: skip
-    return position, orientation
 
 
 def _bat(side: int, agent: str) -> tuple[Column, ...]:
     return (
-        *_pose(side, agent, "bats", "", "of the bat frame, in the world; +x along the blade"),
+        *_pose(f"{agent}_", "bats", "of the bat frame, in the world; +x along the blade", side),
         Column(
             f"{agent}_velocity", "m/s", "float", "of the bat frame's origin, in the world",
             _part("bats", side, slice(7, 10)), 3,
@@ -203,7 +197,7 @@ def _bat(side: int, agent: str) -> tuple[Column, ...]:
             f"{agent}_is_valid", "1", "bool", "tracked; a state that is not is the last that was",
             _part("is_valid", side),
         ),
-        *_pose(side, agent, "tools", "tool_", "of the tool, as measured, in its torso frame"),
+        *_pose(f"{agent}_tool_", "tools", "of the tool, as measured, in its torso frame", side),
     )  # fmt: skip
 
 
@@ -269,10 +263,7 @@ GATE = Stream(
         _AT_TICK, _TICK,
         _text("mode", "disarmed, ramping, armed, holding or tripped"),
         _text("reason", "why it holds or has tripped"),
-        Column("commanded_position", "m", "float", "x y z of the tool's last command, torso frame",
-               _part("commanded", slice(0, 3)), 3),
-        Column("commanded_orientation", "1", "float", "quaternion w x y z of the same",
-               _part("commanded", slice(3, 7)), 4),
+        *_pose("commanded_", "commanded", "of the tool's last command, torso frame"),
         _flag("is_sent", "a command went to the robot in this tick"),
         _flag("is_clipped", "more was asked for than the limits allow"),
         _number("lateness_ms", "ms", "of this tick of the loop"),
@@ -328,8 +319,7 @@ TRACKER = Stream(
         _time("when the recorder got it (to 20 ms)"),
         _count("sequence", "counts the poses of one source from 0"),
         _text("source", "which page or program"),
-        Column("position", "m", "float", "x y z in the world", _part("pose", slice(0, 3)), 3),
-        Column("orientation", "1", "float", "quaternion w x y z", _part("pose", slice(3, 7)), 4),
+        *_pose("", "pose", "in the world"),
         _flag("is_valid", "the source sees the bat"),
     ),
     has_tick=False,
@@ -339,8 +329,7 @@ TRACKER_RAW = Stream(
     (
         _time("when the tracker said it"),
         _text("serial", "of the tracker"),
-        Column("position", "m", "float", "x y z", _part("pose", slice(0, 3)), 3),
-        Column("orientation", "1", "float", "quaternion w x y z", _part("pose", slice(3, 7)), 4),
+        *_pose("", "pose", ""),
         _flag("is_valid", "the base stations see it"),
     ),
     has_tick=False,
