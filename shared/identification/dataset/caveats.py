@@ -1,0 +1,253 @@
+"""What limits a usable recording: named, with the value and what to do."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from shared.identification.dataset.checks import velocity_ratio
+from shared.identification.dataset.types import Caveat, Control, Float64, Trajectory
+
+GAP_PERIODS: Final = 5.0
+"""A hole is longer than this many nominal periods."""
+JITTER: Final = 0.3
+"""Of a nominal period, that a tenth of the steps differ from it."""
+LEAST_RANGE: Final = 0.02
+"""A joint that moves less (rad, m) shows little."""
+LEAST_SPEED: Final = 0.05
+"""A joint that is slower (rad/s, m/s) shows little."""
+HIGHEST_SPEED: Final = 30.0
+"""Of an arm's joint (rad/s, m/s)."""
+COARSE: Final = 1e-3
+"""Steps of an encoder (rad, m)."""
+SLOWEST_HZ: Final = 40.0
+ALIKE: Final = 0.05
+"""Share of a command's own movement by which two commands differ that are nearly the same."""
+JUMP_SPEED: Final = 10.0
+"""Of a tracker (m/s)."""
+JUMP: Final = 0.03
+"""m."""
+NAMED_HOLES: Final = 3
+
+
+def of_times(name: str, stream: str, times: Float64) -> list[Caveat]:
+    """Return caveats on the times of a stream: ``gap``, ``jitter``, ``slow_log``.
+
+    Args:
+        name: of the trajectory.
+        stream: ``command``, ``joints`` or ``tracker``.
+        times: float64[N] (s), rising.
+    """
+    if len(times) < 20:
+        return []
+    steps = np.diff(times)
+    period = float(np.median(steps))
+    found: list[Caveat] = []
+    holes = np.flatnonzero(steps > GAP_PERIODS * period)
+    if len(holes):
+        longest = holes[np.argsort(-steps[holes])[:NAMED_HOLES]]
+        where = ", ".join(f"{steps[row]:.3g} s at {times[row]:.3f} s" for row in sorted(longest))
+        found.append(Caveat("gap", name, (
+            f"{stream} has {len(holes)} holes of over {GAP_PERIODS:g} periods of "
+            f"{1e3 * period:.3g} ms, the longest: {where}; nothing is known of these times"
+        )))  # fmt: skip
+    spread = float(np.quantile(np.abs(steps - period), 0.9))
+    if spread > JITTER * period:
+        found.append(Caveat("jitter", name, (
+            f"a tenth of the rows of {stream} come {1e3 * spread:.3g} ms or more off their period "
+            f"of {1e3 * period:.3g} ms; write the time of measurement, not of receipt"
+        )))  # fmt: skip
+    if stream == "joints" and period > 1.0 / SLOWEST_HZ:
+        found.append(Caveat("slow_log", name, (
+            f"joints are logged {1.0 / period:.3g} times a second; delays and fast effects need "
+            "100 or more"
+        )))  # fmt: skip
+    return found
+
+
+def of_start(trajectory: Trajectory, has_initial: bool, has_velocity: bool) -> list[Caveat]:
+    """Return caveats on a beginning: ``late_joints``, ``late_command``, ``moving_start``.
+
+    Args:
+        trajectory: with both.
+        has_initial: its initial positions were given.
+        has_velocity: its initial velocities were given, or logged.
+    """
+    name, found = trajectory.name, list[Caveat]()
+    joints_at, command_at = trajectory.joints_at, trajectory.command_at
+    period = float(np.median(np.diff(joints_at)))
+    late = max(0.05, GAP_PERIODS * period)
+    if joints_at[0] > late and not has_initial:
+        found.append(Caveat("late_joints", name, (
+            f"the first reading is {joints_at[0]:.3g} s after the first command, and is taken for "
+            "the state then; give initial, or log joints from before the first command"
+        )))  # fmt: skip
+    if command_at[0] > late:
+        found.append(Caveat("late_command", name, (
+            f"the first command is {command_at[0]:.3g} s after the first reading; the first "
+            "command is taken to hold from the start"
+        )))  # fmt: skip
+    if not has_velocity:
+        until = min(len(joints_at) - 1, max(2, round(0.05 / period)))
+        way = trajectory.q[until] - trajectory.q[0]
+        speed = float(np.abs(way / (joints_at[until] - joints_at[0])).max())
+        if speed > LEAST_SPEED:
+            found.append(Caveat("moving_start", name, (
+                f"the arm starts at {speed:.3g} rad/s, and is taken to be at rest; give "
+                "initial_velocity, or log velocities"
+            )))  # fmt: skip
+    return found
+
+
+def of_joints(trajectory: Trajectory, joints: Sequence[str]) -> list[Caveat]:
+    """Return ``fast``, ``quantised``, ``held_readings`` and ``velocity_disagrees``."""
+    name, found = trajectory.name, list[Caveat]()
+    q, times = trajectory.q, trajectory.joints_at
+    steps = np.diff(q, axis=0)
+    still = np.all(steps == 0.0, axis=1)
+    moving = np.abs(q - q[0]).max() > LEAST_RANGE
+    if moving and len(still) > 20 and 0.3 < float(still.mean()) < 0.98:
+        found.append(Caveat("held_readings", name, (
+            f"{still.mean():.0%} of the rows repeat the reading before: the log is faster than "
+            "the joints are read; write each reading once"
+        )))  # fmt: skip
+    for index, joint in enumerate(joints):
+        speed = float(np.quantile(np.abs(steps[:, index] / np.diff(times)), 0.99))
+        if speed > HIGHEST_SPEED:
+            found.append(Caveat("fast", name, (
+                f"joint {joint!r} goes at {speed:.3g} rad/s (m/s) by its positions: are they in "
+                "degrees or mm, or noisy?"
+            )))  # fmt: skip
+        levels = np.unique(q[:, index])
+        step = float(np.diff(levels).min()) if len(levels) > 2 else 0.0
+        if step > COARSE:
+            found.append(Caveat("quantised", name, (
+                f"joint {joint!r} is read in steps of {step:.3g} rad (m), {len(levels)} values in "
+                "all: nothing smaller is seen"
+            )))  # fmt: skip
+        if trajectory.qd is not None:
+            column = trajectory.qd[:, index]
+            is_moving = np.ptp(q[:, index]) > 10.0 * LEAST_RANGE
+            if is_moving and velocity_ratio(times, q[:, index], column) is None:
+                found.append(Caveat("velocity_disagrees", name, (
+                    f"the logged velocity of {joint!r} is not the derivative of its position "
+                    "(correlation under 0.9): is it of another joint, delayed, or filtered?"
+                )))  # fmt: skip
+    return found
+
+
+def of_tracker(trajectory: Trajectory) -> list[Caveat]:
+    """Return ``tracker_jump`` where the tracker goes faster than an arm can."""
+    if trajectory.tracker is None or trajectory.tracker_at is None or len(trajectory.tracker) < 3:
+        return []
+    ways = np.linalg.norm(np.diff(trajectory.tracker[:, :3], axis=0), axis=1)
+    jumps = np.flatnonzero((ways / np.diff(trajectory.tracker_at) > JUMP_SPEED) & (ways > JUMP))
+    if not len(jumps):
+        return []
+    row = int(jumps[np.argmax(ways[jumps])])
+    return [Caveat("tracker_jump", trajectory.name, (
+        f"the tracker jumps {len(jumps)} times, the most by {1e3 * ways[row]:.0f} mm at "
+        f"{trajectory.tracker_at[row]:.3f} s: leave rows out where it is not seen"
+    ))]  # fmt: skip
+
+
+def of_set(
+    trajectories: Sequence[Trajectory], joints: Sequence[str], control: Control
+) -> list[Caveat]:
+    """Return the caveats on all recordings together."""
+    found: list[Caveat] = []
+    if not any(each.repeats for each in trajectories):
+        found.append(Caveat("no_repeat", "", (
+            "no trajectory repeats another, so noise is estimated from the residual alone; play "
+            'one programme twice and write repeats = "<name>"'
+        )))  # fmt: skip
+    for name, words, missing in (
+        ("no_tracker", "was tracked from outside: what the encoders do not see stays hidden, and "
+         "measurement cannot be told from plant", [e for e in trajectories if e.tracker is None]),
+        ("no_velocity", "has logged velocities (qd_<joint>); they are taken from the positions",
+         [e for e in trajectories if e.qd is None]),
+        ("no_effort", "has logged efforts (effort_<joint>): controller and plant are harder to "
+         "tell apart", [e for e in trajectories if e.effort is None]),
+    ):  # fmt: skip
+        if name == "no_effort" and control == "torque":
+            continue
+        if len(missing) == len(trajectories):
+            found.append(Caveat(name, "", f"no trajectory {words}"))
+        elif missing:
+            names = ", ".join(each.name for each in missing[:6])
+            found.append(Caveat(name, missing[0].name, (
+                f"not every trajectory {words}; not {names}" + (", ..." if len(missing) > 6 else "")
+            )))  # fmt: skip
+    return found + _excitation(trajectories, joints) + _programs(trajectories)
+
+
+def _excitation(trajectories: Sequence[Trajectory], joints: Sequence[str]) -> list[Caveat]:
+    found: list[Caveat] = []
+    train = [each for each in trajectories if each.split == "train"]
+    for index, joint in enumerate(joints):
+        span = max(float(np.ptp(each.q[:, index])) for each in train)
+        speed = max(_speed(each, index) for each in train)
+        if span < LEAST_RANGE or speed < LEAST_SPEED:
+            found.append(Caveat("little_excitation", "", (
+                f"joint {joint!r} moves by {span:.2g} rad (m) at up to {speed:.2g} rad/s (m/s) in "
+                f"the train recordings; its friction, inertia and gain need over {LEAST_RANGE} and "
+                f"{LEAST_SPEED}: record a motion of it"
+            )))  # fmt: skip
+    return found
+
+
+def _speed(trajectory: Trajectory, index: int) -> float:
+    """Return the speed of a joint that is passed on a hundredth of the way, over some 50 ms."""
+    times = trajectory.joints_at
+    stride = max(1, min(round(0.05 / float(np.median(np.diff(times)))), (len(times) - 1) // 4))
+    marks = np.arange(0, len(times), stride)
+    speeds = np.abs(np.diff(trajectory.q[marks, index]) / np.diff(times[marks]))
+    return float(np.quantile(speeds, 0.99)) if len(speeds) else 0.0
+
+
+def _programs(trajectories: Sequence[Trajectory]) -> list[Caveat]:
+    """Return ``one_program``, ``test_is_train`` and ``repeat_differs``."""
+    found: list[Caveat] = []
+    by_name = {each.name: each for each in trajectories}
+    train = [each for each in trajectories if each.split == "train"]
+    first = train[0]
+    if all(difference(first, each) < ALIKE for each in train[1:]):
+        found.append(Caveat("one_program", "", (
+            "all train recordings are of one motion: what it does not show is not found; record "
+            "different motions"
+        )))  # fmt: skip
+    for each in trajectories:
+        if each.repeats and difference(by_name[each.repeats], each) > ALIKE:
+            found.append(Caveat("repeat_differs", each.name, (
+                f"it should repeat {each.repeats!r}, but its commands differ by "
+                f"{difference(by_name[each.repeats], each):.0%} of their movement: it tells "
+                "nothing of the noise"
+            )))  # fmt: skip
+        twins = [one.name for one in train if difference(one, each) < ALIKE]
+        if each.split == "test" and twins:
+            found.append(Caveat("test_is_train", each.name, (
+                f"its commands are those of the train recording {twins[0]!r}: it says little "
+                "about other motions; hold out another motion"
+            )))  # fmt: skip
+    return found
+
+
+def difference(one: Trajectory, other: Trajectory) -> float:
+    """Return how far two commands differ, as a share of their own movement.
+
+    Both are read at the same 500 times since their first command, over the shorter of the two;
+    1 or more where their lengths differ by more than a tenth.
+    """
+    spans = [each.command_at[-1] - each.command_at[0] for each in (one, other)]
+    if max(spans) > 1.1 * min(spans) + 0.1:
+        return 1.0
+    grid = np.linspace(0.0, float(min(spans)), 500) + 1e-9
+    first, second = (_held(each, each.command_at[0] + grid) for each in (one, other))
+    movement = float(np.sqrt(np.mean((first - first.mean(0)) ** 2)))
+    apart = float(np.sqrt(np.mean((first - second) ** 2)))
+    return apart / movement if movement > 1e-12 else float(apart > 1e-12)
+
+
+def _held(trajectory: Trajectory, at: Float64) -> Float64:
+    """Return the commands in force at some times, none before the first."""
+    return trajectory.command[np.searchsorted(trajectory.command_at, at, "right") - 1]
