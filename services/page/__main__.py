@@ -1,6 +1,5 @@
 """``python -m services.page``: one page process."""
 
-import contextlib
 import functools
 import json
 import os
@@ -19,16 +18,15 @@ from services.page.service import Page
 from services.page.tracking import PointerTracker
 from services.page.web import Web
 from shared.bus.base import Bus
-from shared.clock import Clock, SystemClock
+from shared.clock import Clock
 from shared.game.rules import RuleBook
 from shared.runtime.files import atomic_write
-from shared.runtime.serve import ServeArgs, open_site_bus, serve_plain
+from shared.runtime.serve import ServeArgs, serve
 from shared.runtime.service import StatusReporter
 from shared.sim.arena import bat_of, target_of
 from shared.sim.config import SimConfig
 from shared.sim.model import FencingModel
 
-ROLE = "page"
 FILE = "page.json"
 """In the run's folder: where the page is."""
 
@@ -65,32 +63,22 @@ def write_place(folder: Path, url: str) -> None:
     atomic_write(folder / FILE, json.dumps({"url": url, "pid": os.getpid()}).encode())
 
 
-def run(service: Page, bus: Bus, clock: Clock, stop: threading.Event) -> None:
+def run(service: Page, bus: Bus, clock: Clock, args: ServeArgs, stop: threading.Event) -> None:
     """Tick whenever something arrives, and often while somebody plays, until ``stop`` is set."""
-    bus.declare_alive(ROLE)
-    reporter = StatusReporter(service, bus, clock, ROLE)
-    while not stop.is_set():
-        service.tick()
-        reporter.tick()
-        bus.wait(service.patience)
+    try:
+        bus.declare_alive(args.role)
+        reporter = StatusReporter(service, bus, clock, args.role)
+        while not stop.is_set():
+            service.tick()
+            reporter.tick()
+            bus.wait(service.patience)
+    finally:
+        (args.run / FILE).unlink(missing_ok=True)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Serve the page until told to stop; return the exit code."""
-    clock = SystemClock()
-
-    def body(args: ServeArgs, stop: threading.Event) -> None:
-        with (
-            contextlib.closing(open_site_bus(args, clock)) as bus,
-            contextlib.closing(build(args, bus, clock)) as service,
-        ):
-            log.info("service_started", pid=os.getpid(), boot=bus.boot)
-            try:
-                run(service, bus, clock, stop)
-            finally:
-                (args.run / FILE).unlink(missing_ok=True)
-
-    return serve_plain(ROLE, body, argv)
+    return serve("page", build, argv, loop=run)
 
 
 if __name__ == "__main__":

@@ -1,37 +1,30 @@
 """``python -m services.recorder``: one recorder process."""
 
-import contextlib
 import dataclasses
 import hashlib
-import os
 import sys
 import threading
 from collections.abc import Sequence
-
-import structlog
 
 from services.recorder.config import RecorderConfig
 from services.recorder.live import about_of
 from services.recorder.service import Recorder
 from shared.bus.base import Bus
 from shared.bus.config import BusConfig
-from shared.clock import Clock, SystemClock
+from shared.clock import Clock
 from shared.errors import ConfigError
 from shared.game.rules import RuleBook
 from shared.policy.action import ActionConfig
-from shared.runtime.serve import ServeArgs, open_site_bus, serve_plain
+from shared.runtime.serve import ServeArgs, open_site_bus, serve
 from shared.runtime.service import StatusReporter
 from shared.sim.config import SimConfig
 from shared.sim.model import FencingModel
 
-ROLE = "recorder"
 PACE = 0.02
 """Seconds from one look at the bus to the next: a live bout says 800 things a second, and to wake
 for each would cost more than to record it."""
 INBOX_MESSAGES = 512
 """Values of one stream that may wait: five seconds of the 100 Hz loop."""
-
-log = structlog.get_logger()
 
 
 def build(args: ServeArgs, bus: Bus, clock: Clock) -> Recorder:
@@ -69,10 +62,10 @@ def open_bus(args: ServeArgs, clock: Clock) -> Bus:
     return open_site_bus(args, clock)
 
 
-def run(service: Recorder, bus: Bus, clock: Clock, stop: threading.Event) -> None:
+def run(service: Recorder, bus: Bus, clock: Clock, args: ServeArgs, stop: threading.Event) -> None:
     """Look at the bus at an even pace until ``stop`` is set."""
-    bus.declare_alive(ROLE)
-    reporter = StatusReporter(service, bus, clock, ROLE)
+    bus.declare_alive(args.role)
+    reporter = StatusReporter(service, bus, clock, args.role)
     while not stop.wait(PACE):
         bus.wait(0.0)
         service.tick()
@@ -81,17 +74,7 @@ def run(service: Recorder, bus: Bus, clock: Clock, stop: threading.Event) -> Non
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the recorder; return its exit code."""
-    clock = SystemClock()
-
-    def body(args: ServeArgs, stop: threading.Event) -> None:
-        with (
-            contextlib.closing(open_bus(args, clock)) as bus,
-            contextlib.closing(build(args, bus, clock)) as service,
-        ):
-            log.info("service_started", pid=os.getpid(), boot=bus.boot)
-            run(service, bus, clock, stop)
-
-    return serve_plain(ROLE, body, argv)
+    return serve("recorder", build, argv, open_bus=open_bus, loop=run)
 
 
 if __name__ == "__main__":

@@ -1,13 +1,10 @@
 """``python -m services.robot_io``: the process that moves a robot; its loop keeps time itself."""
 
-import contextlib
-import os
 import sys
 import threading
 from collections.abc import Callable, Sequence
 
 import msgspec
-import structlog
 
 from services.robot_io.config import RobotIoConfig, SafetyConfig
 from services.robot_io.extras import open_extras
@@ -20,20 +17,17 @@ from services.robot_io.trackers import PolicyTracker, Tracker
 from services.robot_io.twin import TwinLink
 from services.robot_io.vive.config import ViveConfig
 from shared.bus.base import Bus
-from shared.clock import Clock, SystemClock
+from shared.clock import Clock
 from shared.errors import ConfigError
-from shared.runtime.serve import ServeArgs, open_site_bus, serve_plain
+from shared.runtime.serve import ServeArgs, serve
 from shared.runtime.service import StatusReporter
 from shared.sim.config import SimConfig
 from shared.sim.model import FencingModel
 from shared.sim.twin import Twin, command_of
 
-ROLE = "robot-io"
 SWITCH_SECONDS = 0.0005
 """A busy thread (a long message, a strap that connects) lets the loop go on after so long; Python's
 own is 5 ms, at each lock that the loop comes back to."""
-
-log = structlog.get_logger()
 
 
 def build(args: ServeArgs, bus: Bus, clock: Clock) -> RobotIo:
@@ -107,10 +101,10 @@ def twin_parts(
     )
 
 
-def run(service: RobotIo, bus: Bus, clock: Clock, stop: threading.Event) -> None:
+def run(service: RobotIo, bus: Bus, clock: Clock, args: ServeArgs, stop: threading.Event) -> None:
     """Tick at absolute deadlines, and whenever something arrives, until ``stop`` is set."""
-    bus.declare_alive(ROLE)
-    reporter = StatusReporter(service, bus, clock, ROLE)
+    bus.declare_alive(args.role)
+    reporter = StatusReporter(service, bus, clock, args.role)
     while not stop.is_set():
         service.tick()
         reporter.tick()
@@ -119,18 +113,8 @@ def run(service: RobotIo, bus: Bus, clock: Clock, stop: threading.Event) -> None
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the loop until it is told to stop; return the exit code."""
-    clock = SystemClock()
     sys.setswitchinterval(SWITCH_SECONDS)
-
-    def body(args: ServeArgs, stop: threading.Event) -> None:
-        with (
-            contextlib.closing(open_site_bus(args, clock)) as bus,
-            contextlib.closing(build(args, bus, clock)) as service,  # closing holds the robot
-        ):
-            log.info("service_started", pid=os.getpid(), boot=bus.boot)
-            run(service, bus, clock, stop)
-
-    return serve_plain(ROLE, body, argv)
+    return serve("robot-io", build, argv, loop=run)  # closing the service holds the robot
 
 
 if __name__ == "__main__":

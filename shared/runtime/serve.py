@@ -39,6 +39,7 @@ CLOSE_SECONDS = 15.0
 """From the signal to stop to the end of the process, whatever it is doing."""
 
 S = TypeVar("S", bound=msgspec.Struct)
+T = TypeVar("T", bound=Ticking)
 log = structlog.get_logger()
 
 
@@ -71,8 +72,9 @@ class ServeArgs:
         return load_section(self.site, name, type, self.overrides)
 
 
-Build = Callable[[ServeArgs, Bus, Clock], Ticking]
+Build = Callable[[ServeArgs, Bus, Clock], T]
 OpenBus = Callable[[ServeArgs, Clock], Bus]
+Loop = Callable[[T, Bus, Clock, ServeArgs, threading.Event], None]
 
 
 def run_id_of(folder: Path) -> str:
@@ -149,8 +151,20 @@ def open_site_bus(args: ServeArgs, clock: Clock) -> Bus:
     return open_zenoh(cfg, args.name, clock, args.run_id)
 
 
+def plain_loop(
+    service: Ticking, bus: Bus, clock: Clock, args: ServeArgs, stop: threading.Event
+) -> None:
+    """Tick until ``stop`` is set, as ``run`` says."""
+    run(service, bus, clock, args.role, stop)
+
+
 def serve(
-    role: str, build: Build, argv: Sequence[str] | None = None, *, open_bus: OpenBus = open_site_bus
+    role: str,
+    build: Build[T],
+    argv: Sequence[str] | None = None,
+    *,
+    open_bus: OpenBus = open_site_bus,
+    loop: Loop[T] = plain_loop,
 ) -> int:
     """Run one service process until it is told to stop; return its exit code.
 
@@ -159,6 +173,7 @@ def serve(
         build: makes the service; it may raise ``RiposteError`` for bad input.
         argv: command line without the program; ``sys.argv`` when None.
         open_bus: opens the session.
+        loop: ticks the service until the event is set.
     """
     clock = SystemClock()
 
@@ -168,7 +183,7 @@ def serve(
             contextlib.closing(build(args, bus, clock)) as service,
         ):
             log.info("service_started", pid=os.getpid(), boot=bus.boot)
-            run(service, bus, clock, role, stop)
+            loop(service, bus, clock, args, stop)
 
     return serve_plain(role, body, argv)
 

@@ -65,7 +65,7 @@ def main(endpoint: str, site: str, steamvr: str) -> None:
     service = build(args, bus, clock)
     stop = threading.Event()
     threading.Thread(target=move, args=(service, vive, stop), daemon=True).start()
-    run(service, bus, clock, stop)
+    run(service, bus, clock, args, stop)
 
 
 if __name__ == "__main__":
