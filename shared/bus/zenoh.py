@@ -33,7 +33,7 @@ from shared.bus.counters import Counters
 from shared.bus.endpoints import Answer, Host, Present, Requests, Values, ask_of, too_long
 from shared.bus.keys import check_chunk, key_of, pattern_of
 from shared.bus.latest import LatestSent, stamp_of
-from shared.bus.reopening import Reopening
+from shared.bus.watchdog import Watchdog
 from shared.clock import Clock
 from shared.errors import BusError, ConfigError, MessageError
 from shared.messages.message import Message
@@ -138,23 +138,22 @@ class ZenohBus:
     ) -> None:
         self.name = name
         self.boot = secrets.token_hex(8)
-        self._cfg = cfg
         self._clock = clock
+        self._routers = cfg.routers
         self._prefix = f"{PREFIX}/{run}/"
         self._counts = Counters()
         self._news = threading.Event()
         self._host = Host(
             clock, self._counts, self._news.set, cfg.inbox_messages, cfg.inbox_mib << 20
         )
-        self._session: zenoh.Session | None = session
-        self._opening: Reopening[zenoh.Session] | None = None
+        self._watchdog = Watchdog(
+            cfg, clock, session, _has_router, lambda: _try_open(client_json(cfg)), _close
+        )
         self._declared: dict[object, tuple[Declare, Any]] = {}
         self._present: dict[str, Present] = {}
         self._latest = LatestSent(cfg.resend_seconds - UPKEEP_SECONDS / 2)
         self._published = 0
-        self._seen_at = clock.now()
         self._upkeep_at = 0.0
-        self._is_closed = False
 
     @property
     def counters(self) -> Mapping[str, int]:
@@ -203,8 +202,8 @@ class ZenohBus:
         answer, payload = ask_of(self._host, service, key, message, timeout)
         if payload is None:
             return answer
-        if self._session is None:
-            answer.on_arrival(NoAnswer(f"{self._without_router()} to carry {key}"))
+        if (session := self._watchdog.session) is None:
+            answer.on_arrival(NoAnswer(f"{self._watchdog.without_router()} to carry {key}"))
             return answer
         callback = self._guard(
             lambda reply: take_answer(
@@ -213,7 +212,7 @@ class ZenohBus:
             answer.on_end,
         )
         try:
-            self._session.get(
+            session.get(
                 self._prefix + key,
                 callback,
                 payload=payload,
@@ -262,7 +261,8 @@ class ZenohBus:
             now = self._clock.now()
             if now >= self._upkeep_at:
                 self._upkeep_at = now + UPKEEP_SECONDS
-                self._keep_session(now)
+                if self._watchdog.look(now):
+                    self._restore()
                 for sent in self._latest.due(now):
                     self._put(sent.key, sent.payload, sent.stamp, Qos.LATEST)
             if self._news.is_set():
@@ -274,12 +274,7 @@ class ZenohBus:
 
     def close(self) -> None:
         """Leave the bus, in ``CLOSE_SECONDS`` at most."""
-        self._is_closed = True
-        if self._opening is not None:
-            self._opening.cancel()
-        session, self._session = self._session, None
-        if session is not None:
-            _close(session)
+        self._watchdog.close()
 
     def _guard(
         self, take: Callable[[Any], None], end: Callable[[], None] | None = None
@@ -298,11 +293,11 @@ class ZenohBus:
         return Callback(run, end)
 
     def _put(self, key: str, payload: bytes, stamp: bytes, qos: Qos) -> None:
-        if self._session is None:
+        if (session := self._watchdog.session) is None:
             return
         latest = qos is Qos.LATEST
         with contextlib.suppress(zenoh.ZError):  # the watchdog sees a closed session
-            self._session.put(
+            session.put(
                 key,
                 payload,
                 attachment=stamp,
@@ -314,9 +309,9 @@ class ZenohBus:
     def _declare(self, owner: object, declare: Declare) -> None:
         """Declare something now and in every later session, until its owner is closed."""
         entity = None
-        if self._session is not None:
+        if (session := self._watchdog.session) is not None:
             with contextlib.suppress(zenoh.ZError):  # a closed session: the watchdog's business
-                entity = declare(self._session)
+                entity = declare(session)
         self._declared[owner] = (declare, entity)
 
     def _undeclare(self, owner: object) -> None:
@@ -325,28 +320,8 @@ class ZenohBus:
             with contextlib.suppress(zenoh.ZError):
                 entity.undeclare()
 
-    def _keep_session(self, now: float) -> None:
-        """Watch for a router; without one for long, open a new session, and at last give up."""
-        if self._is_closed:
-            return
-        if self._session is not None and self._session.info.routers_zid():
-            self._seen_at = now
-            return
-        if now - self._seen_at > self._cfg.give_up_seconds:
-            raise BusError(f"{self._without_router()}: giving up")
-        if self._opening is not None:
-            session = self._opening.take()
-            if session is not None:
-                self._opening = None
-                self._adopt(session, now)
-        elif now - self._seen_at > self._cfg.watchdog_seconds:
-            log.warning("session_reopened", reason=self._without_router())
-            session, self._session = self._session, None
-            self._opening = Reopening(session, lambda: _try_open(client_json(self._cfg)), _close)
-
-    def _adopt(self, session: zenoh.Session, now: float) -> None:
-        self._session = session
-        self._seen_at = now
+    def _restore(self) -> None:
+        """Declare everything in the new session, and send every LATEST value again."""
         self._counts.add("reconnects")
         for present in self._present.values():
             present.clear()
@@ -355,11 +330,7 @@ class ZenohBus:
         for sent in self._latest.all():
             self._put(sent.key, sent.payload, sent.stamp, Qos.LATEST)
         self._news.set()
-        log.info("session_restored", routers=", ".join(self._cfg.routers))
-
-    def _without_router(self) -> str:
-        seconds = self._clock.now() - self._seen_at
-        return f"no router at {', '.join(self._cfg.routers)} for {seconds:.1f} s"
+        log.info("session_restored", routers=", ".join(self._routers))
 
 
 class _Path:
@@ -388,6 +359,10 @@ def _note_token(present: Present, token: zenoh.Sample) -> None:
 
 def _open(config: str) -> zenoh.Session:
     return zenoh.open(zenoh.Config.from_json5(config))
+
+
+def _has_router(session: zenoh.Session) -> bool:
+    return bool(session.info.routers_zid())
 
 
 def _try_open(config: str) -> zenoh.Session | None:
