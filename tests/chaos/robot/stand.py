@@ -4,10 +4,8 @@ The test is the operator, who arms, and the person, whose bat is tracked until s
 """
 
 import subprocess
-import sys
 import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
@@ -16,18 +14,13 @@ import pytest
 
 from services.robot_io.config import SafetyConfig
 from shared.bus.base import Bus
-from shared.bus.config import BusConfig
-from shared.bus.ports import free_port
-from shared.bus.zenoh import open_zenoh
-from shared.clock import SystemClock
-from shared.messages.play import BatStates, GateReply, GateRequest, GateState, TrackerPose
-from shared.messages.topics import ARM, BATS, GATE, STATUS, TRACKER
+from shared.messages.play import GateReply, TrackerPose
+from shared.messages.topics import TRACKER
 from shared.testing.fake_pr2.fake import FakePr2
 from shared.testing.ros_master import has_ros_master
+from tests.integration.robot_io.site import Site
 
 Link = Literal["twin", "pr2"]
-ROOT = Path(__file__).resolve().parents[3]
-POLICY = Path(__file__).with_name("policy.py")
 LIMITS = SafetyConfig()
 PERSON = np.array([1.0, 0.6, 1.2, 1.0, 0.0, 0.0, 0.0])
 """Where the person's bat is: out of the way of the robot's."""
@@ -65,80 +58,22 @@ class Person(threading.Thread):
         self.join(5.0)
 
 
-class Stand:
+class Stand(Site):
     """Everything that runs in a live bout but a referee."""
 
     def __init__(self, folder: Path, link: Link) -> None:
-        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
-        self._run = ("--run", str(folder), "--run-id", "live")
-        self.processes: list[subprocess.Popen[bytes]] = []
         self.fake = started_fake() if link == "pr2" else None
-        self.router = self.start_router()
+        settings = ['robot_io.tracker="mouse"']
+        if self.fake is not None:
+            settings += ['robot_io.link="pr2"', 'pr2.host="127.0.0.1"']
+            settings.append(f'pr2.master_uri="{self.fake.master_uri}"')
+        super().__init__(folder, *settings)
         try:
-            self.bus = self._join("operator")
-            self._hand = self._join("hand")
+            self._hand = self.join("hand")
         except BaseException:
-            self._end()
+            super().close()
             raise
         self.person = Person(self._hand)
-        self._bats = self.bus.subscribe(BATS)
-        self._gates = self.bus.subscribe(GATE)
-        self.status = self.bus.subscribe(STATUS, role="robot-io")
-        self.states: list[BatStates] = []
-        self.seen: list[GateState] = []
-        self._words = ["safety.ramp=0.5", 'robot_io.tracker="mouse"']
-        if self.fake is not None:
-            self._words += ['robot_io.link="pr2"', 'pr2.host="127.0.0.1"']
-            self._words.append(f'pr2.master_uri="{self.fake.master_uri}"')
-        self.robot_io = self.start_robot_io()
-
-    def start_robot_io(self) -> "subprocess.Popen[bytes]":
-        words = [word for setting in self._words for word in ("--set", setting)]
-        return self.service("robot_io", *words)
-
-    def start_router(self) -> "subprocess.Popen[bytes]":
-        return self._start("-m", "services.router", *self._run, "--listen", self.endpoint)
-
-    def start_policy(self, kind: str = "moving") -> "subprocess.Popen[bytes]":
-        return self._start(str(POLICY), kind, self.endpoint)
-
-    def service(self, module: str, *words: str) -> "subprocess.Popen[bytes]":
-        return self._start(
-            "-m", f"services.{module}", *self._run, "--connect", self.endpoint, *words
-        )
-
-    def kill(self, process: "subprocess.Popen[bytes]") -> None:
-        """As by ``kill -9``."""
-        process.kill()
-        process.wait()
-
-    def until(self, condition: Callable[[], bool], seconds: float = 20.0) -> None:
-        deadline = time.monotonic() + seconds
-        while time.monotonic() < deadline:
-            while (states := self._bats.take()) is not None:
-                self.states.append(states)
-            while (gate := self._gates.take()) is not None:
-                self.seen.append(gate)
-            if condition():
-                return
-            self.bus.wait(0.01)
-        raise AssertionError(f"not within {seconds} s; the gate: {self.seen[-1:]}")
-
-    def rest(self, seconds: float) -> None:
-        """Listen for so long."""
-        deadline = time.monotonic() + seconds
-        self.until(lambda: time.monotonic() >= deadline, seconds + 5.0)
-
-    def is_mode(self, *modes: str) -> bool:
-        return bool(self.seen) and self.seen[-1].mode in modes
-
-    def ask(self, action: str) -> GateReply:
-        asked = GateRequest(action=action, operator="test")  # type: ignore[arg-type]
-        pending = self.bus.ask(ARM, asked, timeout=3.0)
-        self.until(lambda: pending.take() is not None, 5.0)
-        reply = pending.take()
-        assert isinstance(reply, GateReply)
-        return reply
 
     def arm(self, seconds: float = 40.0) -> None:
         """Do what a person does who reads what is in the way, until it is armed.
@@ -206,22 +141,12 @@ class Stand:
     def close(self) -> None:
         self.person.end()
         self._hand.close()
-        self.bus.close()
-        self._end()
+        super().close()
 
-    def _end(self) -> None:
-        for process in reversed(self.processes):
-            self.kill(process)
+    def end(self) -> None:
+        super().end()
         if self.fake is not None:
             self.fake.close()
-
-    def _join(self, name: str) -> Bus:
-        return open_zenoh(BusConfig(connect=(self.endpoint,)), name, SystemClock(), "live")
-
-    def _start(self, *words: str) -> "subprocess.Popen[bytes]":
-        process = subprocess.Popen([sys.executable, *words], cwd=ROOT)
-        self.processes.append(process)
-        return process
 
 
 def started_fake() -> FakePr2:

@@ -15,42 +15,58 @@ from shared.messages.play import BatStates, GateReply, GateRequest, GateState
 from shared.messages.topics import ARM, BATS, GATE, STATUS
 
 ROOT = Path(__file__).resolve().parents[3]
-POLICY = Path(__file__).with_name("moving_policy.py")
+POLICY = Path(__file__).with_name("policy.py")
 
 
 class Site:
     """A router and robot_io, each a process, and what else a test starts; it is the person."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *settings: str) -> None:
+        """Start both; the settings are robot_io's."""
         self.endpoint = f"tcp/127.0.0.1:{free_port()}"
         self._run = ("--run", str(folder), "--run-id", "live")
+        self._settings = ("safety.ramp=0.5", *settings)
         self.processes: list[subprocess.Popen[bytes]] = []
         self.router = self.start_router()
-        self.bus: Bus = open_zenoh(
-            BusConfig(connect=(self.endpoint,)), "person", SystemClock(), "live"
-        )
+        try:
+            self.bus = self.join("person")
+        except BaseException:
+            self.end()
+            raise
         self.bats = self.bus.subscribe(BATS)
         self.gates = self.bus.subscribe(GATE)
         self.status = self.bus.subscribe(STATUS, role="robot-io")
         self.states: list[BatStates] = []
         self.seen: list[GateState] = []
-        self.service("robot_io", "--set", "safety.ramp=0.5")
+        self.robot_io = self.start_robot_io()
+
+    def join(self, name: str) -> Bus:
+        return open_zenoh(BusConfig(connect=(self.endpoint,)), name, SystemClock(), "live")
+
+    def start_router(self) -> "subprocess.Popen[bytes]":
+        return self._start("-m", "services.router", *self._run, "--listen", self.endpoint)
+
+    def start_robot_io(self) -> "subprocess.Popen[bytes]":
+        words = [word for setting in self._settings for word in ("--set", setting)]
+        return self.service("robot_io", *words)
+
+    def start_policy(self, kind: str = "moving") -> "subprocess.Popen[bytes]":
+        return self._start(str(POLICY), kind, self.endpoint)
 
     def service(self, module: str, *words: str) -> "subprocess.Popen[bytes]":
         return self._start(
             "-m", f"services.{module}", *self._run, "--connect", self.endpoint, *words
         )
 
-    def start_router(self) -> "subprocess.Popen[bytes]":
-        return self._start("-m", "services.router", *self._run, "--listen", self.endpoint)
-
-    def moving_policy(self) -> "subprocess.Popen[bytes]":
-        return self._start(str(POLICY), self.endpoint)
-
     def _start(self, *words: str) -> "subprocess.Popen[bytes]":
         process = subprocess.Popen([sys.executable, *words], cwd=ROOT)
         self.processes.append(process)
         return process
+
+    def kill(self, process: "subprocess.Popen[bytes]") -> None:
+        """As by ``kill -9``."""
+        process.kill()
+        process.wait()
 
     def until(self, condition: Callable[[], bool], seconds: float = 20.0) -> None:
         deadline = time.monotonic() + seconds
@@ -67,10 +83,10 @@ class Site:
     def rest(self, seconds: float) -> None:
         """Listen for so long."""
         deadline = time.monotonic() + seconds
-        self.until(lambda: time.monotonic() >= deadline, seconds + 1.0)
+        self.until(lambda: time.monotonic() >= deadline, seconds + 5.0)
 
-    def is_mode(self, mode: str) -> bool:
-        return bool(self.seen) and self.seen[-1].mode == mode
+    def is_mode(self, *modes: str) -> bool:
+        return bool(self.seen) and self.seen[-1].mode in modes
 
     def ask(self, action: str) -> GateReply:
         asked = GateRequest(action=action, operator="test")  # type: ignore[arg-type]
@@ -93,6 +109,9 @@ class Site:
 
     def close(self) -> None:
         self.bus.close()
+        self.end()
+
+    def end(self) -> None:
+        """Kill every process."""
         for process in reversed(self.processes):
-            process.kill()
-            process.wait()
+            self.kill(process)

@@ -19,7 +19,7 @@ def site(tmp_path: Path) -> Iterator[Site]:
 
 
 def test_a_policy_moves_the_robot_and_its_death_holds_then_trips(site: Site):
-    policy = site.moving_policy()
+    policy = site.start_policy()
     site.arm()
     count = len(site.states)
     site.until(lambda: len(site.states) >= count + 200)
@@ -35,7 +35,7 @@ def test_a_policy_moves_the_robot_and_its_death_holds_then_trips(site: Site):
     assert modes.index("holding") < modes.index("tripped")
     assert site.seen[-1].reason == "no usable command for 0.5 s"
 
-    site.moving_policy()  # it comes back, and that alone moves nothing
+    site.start_policy()  # it comes back, and that alone moves nothing
     count = len(site.states)
     site.until(lambda: len(site.states) >= count + 150)
     still = np.array([states.tools[1, :3] for states in site.states[count + 50 :]])
@@ -56,7 +56,7 @@ def test_a_policy_moves_the_robot_and_its_death_holds_then_trips(site: Site):
 
 
 def test_a_router_that_dies_stops_the_robot_and_its_return_does_not_move_it(site: Site):
-    site.moving_policy()
+    site.start_policy()
     site.arm()
     boot = site.states[-1].boot
     site.router.kill()

@@ -17,12 +17,7 @@ class ViveSite(Site):
     """A site whose robot_io follows a tracker."""
 
     def __init__(self, folder: Path, person: Person) -> None:
-        self._overrides = [word for one in person.settings for word in ("--set", one)]
-        super().__init__(folder)
-
-    def service(self, module: str, *words: str):  # type: ignore[override]
-        own = self._overrides if module == "robot_io" else []
-        return super().service(module, *own, *words)
+        super().__init__(folder, *person.settings)
 
 
 @pytest.fixture
@@ -44,7 +39,7 @@ def site(person: Person, tmp_path: Path) -> Iterator[ViveSite]:
 def test_a_lost_tracker_makes_the_robot_hold_and_a_found_one_lets_it_go_on(
     site: ViveSite, person: Person
 ):
-    site.moving_policy()
+    site.start_policy()
     site.arm()
     count = len(site.states)
     site.until(lambda: len(site.states) >= count + 150)
