@@ -9,27 +9,16 @@ from hypothesis import strategies as st
 
 from services.robot_io.config import SafetyConfig
 from services.robot_io.gate import Gate, GateInputs, GateMemory, disarmed
-from services.robot_io.limits import Blade
 from services.robot_io.poses import Pose, add, distance, length, rotation_between, turned, unit
+from tests.property.robot.streams import BLADE, LIMITS, PERIOD, SMALL
 
 EXAMPLES = 200
 STEPS = 500
-PERIOD = 0.01
-BLADE = Blade(direction=(0.70710678, 0.0, 0.70710678), front=0.7, back=-0.05, radius=0.025)
 START = Pose((0.553, -0.25, 0.0), (0.67, 0.324, -0.085, 0.663))
-SMALL = 1e-6
 
-limits = st.builds(
-    SafetyConfig,
-    game_speed=st.floats(0.25, 1.0),
-    acceleration=st.floats(1.0, 20.0),
-    turn_speed=st.floats(0.2, 4.0),
-    turn_acceleration=st.floats(1.0, 60.0),
-    lead=st.floats(0.03, 0.15),
-    ceiling=st.floats(0.7, 0.9),
-    keep_out_radius=st.floats(0.1, 0.6),
-    ramp=st.floats(0.5, 1.0),
-)
+RANGES = LIMITS | {"ramp": (0.5, 1.0)}
+
+limits = st.builds(SafetyConfig, **{name: st.floats(*ends) for name, ends in RANGES.items()})
 
 
 class Person:

@@ -22,6 +22,12 @@ STEPS = 40
 SMALL = 1e-6
 BLADE = Blade(direction=(0.70710678, 0.0, 0.70710678), front=0.7, back=-0.05, radius=0.025)
 BAD = (math.nan, math.inf, -math.inf, 1e300, -1e300, 0.0, 3.0)
+LIMITS = {
+    "game_speed": (0.25, 1.0), "acceleration": (1.0, 20.0), "turn_speed": (0.2, 4.0),
+    "turn_acceleration": (1.0, 60.0), "lead": (0.03, 0.15), "ceiling": (0.7, 0.9),
+    "keep_out_radius": (0.1, 0.6), "ramp": (0.5, 2.0),
+}  # fmt: skip
+"""Smallest and largest value of each limit that is tried."""
 Sender = Callable[[int, Pose], Pose | None]
 
 
@@ -41,16 +47,7 @@ class Tally:
 
 
 def random_limits(draw: random.Random) -> SafetyConfig:
-    return SafetyConfig(
-        game_speed=draw.uniform(0.25, 1.0),
-        acceleration=draw.uniform(1.0, 20.0),
-        turn_speed=draw.uniform(0.2, 4.0),
-        turn_acceleration=draw.uniform(1.0, 60.0),
-        lead=draw.uniform(0.03, 0.15),
-        ceiling=draw.uniform(0.7, 0.9),
-        keep_out_radius=draw.uniform(0.1, 0.6),
-        ramp=draw.uniform(0.5, 2.0),
-    )
+    return SafetyConfig(**{name: draw.uniform(*limits) for name, limits in LIMITS.items()})
 
 
 def random_pose(draw: random.Random, gate: Gate) -> Pose:
