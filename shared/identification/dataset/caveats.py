@@ -16,6 +16,8 @@ LEAST_RANGE: Final = 0.02
 """A joint that moves less (rad, m) shows little."""
 LEAST_SPEED: Final = 0.05
 """A joint that is slower (rad/s, m/s) shows little."""
+START: Final = 0.1
+"""From whose readings the first speed is judged (s)."""
 HIGHEST_SPEED: Final = 30.0
 """Of an arm's joint (rad/s, m/s)."""
 COARSE: Final = 1e-3
@@ -88,10 +90,11 @@ def of_start(trajectory: Trajectory, has_initial: bool, has_velocity: bool) -> l
             "command is taken to hold from the start"
         )))  # fmt: skip
     if not has_velocity:
-        until = min(len(joints_at) - 1, max(2, round(0.05 / period)))
-        way = trajectory.q[until] - trajectory.q[0]
-        speed = float(np.abs(way / (joints_at[until] - joints_at[0])).max())
-        if speed > LEAST_SPEED:
+        count = min(len(joints_at), max(5, round(START / period)))
+        powers = np.vander(joints_at[:count] - joints_at[0], min(3, count))
+        slopes = np.linalg.lstsq(powers, trajectory.q[:count], rcond=None)[0][-2]
+        speed = float(np.abs(slopes).max())
+        if speed > 2.0 * LEAST_SPEED:
             found.append(Caveat("moving_start", name, (
                 f"the arm starts at {speed:.3g} rad/s, and is taken to be at rest; give "
                 "initial_velocity, or log velocities"
@@ -241,13 +244,16 @@ def difference(one: Trajectory, other: Trajectory) -> float:
     spans = [each.command_at[-1] - each.command_at[0] for each in (one, other)]
     if max(spans) > 1.1 * min(spans) + 0.1:
         return 1.0
-    grid = np.linspace(0.0, float(min(spans)), 500) + 1e-9
-    first, second = (_held(each, each.command_at[0] + grid) for each in (one, other))
-    movement = float(np.sqrt(np.mean((first - first.mean(0)) ** 2)))
+    shorter = float(min(spans))
+    grid = 1e-9 + shorter * np.arange(500) / 499.0
+    first, second = [_held(each, each.command_at[0] + grid) for each in (one, other)]
+    centre: Float64 = np.mean(first, axis=0)
+    movement = float(np.sqrt(np.mean((first - centre) ** 2)))
     apart = float(np.sqrt(np.mean((first - second) ** 2)))
     return apart / movement if movement > 1e-12 else float(apart > 1e-12)
 
 
 def _held(trajectory: Trajectory, at: Float64) -> Float64:
     """Return the commands in force at some times, none before the first."""
-    return trajectory.command[np.searchsorted(trajectory.command_at, at, "right") - 1]
+    rows = np.searchsorted(trajectory.command_at, at, side="right") - 1
+    return np.take(trajectory.command, rows, axis=0)

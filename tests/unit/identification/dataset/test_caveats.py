@@ -1,0 +1,167 @@
+import numpy as np
+import pytest
+
+from shared.identification.dataset.reading import read_dataset
+from shared.identification.dataset.types import Caveat
+from tests.unit.identification.dataset.folders import (
+    JOINTS,
+    MANIFEST,
+    command,
+    motion,
+    poses,
+    table,
+    written,
+)
+
+
+def the(folder, name: str) -> Caveat:
+    found = [each for each in read_dataset(folder).caveats if each.name == name]
+    assert len(found) == 1, [each.name for each in read_dataset(folder).caveats]
+    return found[0]
+
+
+def rewritten(folder, seed, joints, given=None) -> None:
+    name = ("one", "two", "three")[seed]
+    table(folder / name / "joints.parquet", joints)
+    table(folder / name / "command.parquet", command(joints) if given is None else given)
+
+
+def rows(columns: dict, which) -> dict:
+    return {name: values[which] for name, values in columns.items()}
+
+
+def test_a_hole_is_told_with_its_place(tmp_path):
+    folder = written(tmp_path)
+    keep = np.ones(400, bool)
+    keep[201:220] = False
+    table(folder / "two" / "joints.parquet", rows(motion(1), keep))
+    found = the(folder, "gap")
+    assert found.trajectory == "two"
+    assert "joints has 1 holes" in found.text
+    assert "0.2 s at 2.000 s" in found.text
+
+
+def test_times_of_receipt_are_told(tmp_path):
+    folder = written(tmp_path)
+    joints = motion(1)
+    rng = np.random.default_rng(3)
+    joints["t_ns"] = joints["t_ns"] + rng.integers(0, 9_000_000, 400)
+    table(folder / "two" / "joints.parquet", joints)
+    assert "joints come" in the(folder, "jitter").text
+
+
+@pytest.mark.parametrize("kind", ["range", "speed"])
+def test_a_joint_that_hardly_moves_is_told(tmp_path, kind):
+    folder = written(tmp_path)
+    for seed in range(3):
+        joints = motion(seed)
+        if kind == "range":
+            joints["q_elbow"], joints["qd_elbow"] = (
+                joints["q_elbow"] * 0.02,
+                joints["qd_elbow"] * 0.02,
+            )
+        else:
+            times = (joints["t_ns"] - joints["t_ns"][0]) / 1e9
+            joints["q_elbow"], joints["qd_elbow"] = 0.02 * times, np.full(400, 0.02)
+        rewritten(folder, seed, joints)
+    assert "joint 'elbow' moves by" in the(folder, "little_excitation").text
+
+
+def test_readings_that_only_repeat_are_told(tmp_path):
+    folder = written(tmp_path)
+    joints = motion(1)
+    held = np.arange(400) // 2 * 2
+    rewritten(folder, 1, {**rows(joints, held), "t_ns": joints["t_ns"]}, command(joints))
+    assert "50% of the rows repeat" in the(folder, "held_readings").text
+
+
+def test_a_coarse_encoder_is_told(tmp_path):
+    folder = written(tmp_path)
+    joints = motion(1)
+    joints["q_elbow"] = np.round(joints["q_elbow"] / 0.01) * 0.01
+    rewritten(folder, 1, joints)
+    assert "joint 'elbow' is read in steps of 0.01 rad" in the(folder, "quantised").text
+
+
+def test_a_velocity_of_another_joint_is_told(tmp_path):
+    folder = written(tmp_path)
+    joints = motion(1)
+    joints["qd_elbow"] = np.cos(3.7 * np.arange(400) / 100)
+    rewritten(folder, 1, joints)
+    assert "'elbow'" in the(folder, "velocity_disagrees").text
+
+
+def test_a_jump_of_the_tracker_is_told(tmp_path):
+    folder = written(tmp_path)
+    seen = poses(motion(1))
+    seen["x"] = seen["x"] + np.where(np.arange(400) == 100, 0.3, 0.0)
+    table(folder / "two" / "tracker.parquet", seen)
+    assert "jumps 2 times, the most by 3" in the(folder, "tracker_jump").text
+
+
+def test_what_is_not_logged_is_told_once_for_the_set(tmp_path):
+    folder = written(tmp_path)
+    for seed, name in enumerate(("one", "two", "three")):
+        (folder / name / "tracker.parquet").unlink()
+        joints = motion(seed)
+        bare = {key: joints[key] for key in ("t_ns", *(f"q_{each}" for each in JOINTS))}
+        rewritten(folder, seed, bare)
+    found = read_dataset(folder)
+    assert [each.name for each in found.caveats] == [
+        "no_repeat", "no_tracker", "no_velocity", "no_effort",
+    ]  # fmt: skip
+    assert not found.has_tracker
+    assert found.trajectories[0].qd is None
+    np.testing.assert_array_equal(found.trajectories[0].initial_qd, [0.0, 0.0])
+
+
+def test_velocities_of_some_joints_are_not_used(tmp_path):
+    folder = written(tmp_path)
+    joints = motion(1)
+    joints["qd_elbow"] = np.full(400, np.nan)
+    rewritten(folder, 1, joints)
+    assert "elbow is not there" in the(folder, "partial_velocity").text
+    assert read_dataset(folder).trajectories[1].qd is None
+
+
+def test_one_motion_for_all_and_a_test_that_is_train_are_told(tmp_path):
+    folder = written(tmp_path)
+    for seed in (1, 2):
+        noisy = motion(0)
+        noisy["q_elbow"] = noisy["q_elbow"] + 1e-4 * seed
+        rewritten(folder, seed, noisy, command(motion(0)))
+    assert the(folder, "one_program").trajectory == ""
+    assert the(folder, "test_is_train").trajectory == "three"
+
+
+def test_a_repeat_of_another_motion_is_told(tmp_path):
+    text = MANIFEST.replace('name = "two"\n', 'name = "two"\nrepeats = "one"\n')
+    found = the(written(tmp_path, manifest=text), "repeat_differs")
+    assert found.trajectory == "two"
+
+
+def test_a_repeat_of_the_same_commands_is_fine(tmp_path):
+    text = MANIFEST.replace('name = "two"\n', 'name = "two"\nrepeats = "one"\n')
+    folder = written(tmp_path, manifest=text)
+    later = motion(0)
+    later["t_ns"] = later["t_ns"] + 3_600_000_000_000
+    later["q_elbow"] = later["q_elbow"] + 1e-5
+    rewritten(folder, 1, later, command(later))
+    table(folder / "two" / "tracker.parquet", poses(later))
+    assert [each.name for each in read_dataset(folder).caveats] == ["one_program"]
+
+
+def test_a_late_start_of_either_is_told(tmp_path):
+    folder = written(tmp_path)
+    rewritten(folder, 0, rows(motion(0), slice(30, None)), command(motion(0)))
+    rewritten(folder, 1, motion(1), rows(command(motion(1)), slice(40, None)))
+    assert "0.3 s after the first command" in the(folder, "late_joints").text
+    assert "0.4 s after the first reading" in the(folder, "late_command").text
+
+
+def test_a_start_in_motion_without_velocities_is_told(tmp_path):
+    folder = written(tmp_path)
+    joints = rows(motion(1), slice(50, None))
+    del joints["qd_elbow"], joints["qd_shoulder"]
+    rewritten(folder, 1, joints)
+    assert "rad/s, and is taken to be at rest" in the(folder, "moving_start").text
