@@ -37,6 +37,8 @@ class Recorded:
     """Name of the recording that it is, or is a part of."""
     begin: float = 0.0
     """How far into the recording time 0 is (s)."""
+    earlier: tuple[str, ...] = ()
+    """Names of the recordings made before it."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,9 @@ class Rollouts:
         self._joints = [self.model.joint(name) for name in plant.joints]
         self._qpos = np.array([int(joint.qposadr[0]) for joint in self._joints])
         self._dofs = np.array([int(joint.dofadr[0]) for joint in self._joints])
+        self._columns = np.concatenate(
+            [_controls(self.model, int(self.model.actuator(name).id)) for name in plant.actuators]
+        )
         self._batch = mujoco.batch.Batch(self.model, nsim=capacity, nthread=1)
         self._expanded: dict[str, Float64] = {}
         self._stale: set[str] = set()
@@ -97,9 +102,9 @@ class Rollouts:
         ids = np.arange(len(rows))
         self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
         qpos, qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
-        for row, (_, recorded) in zip(rows, work, strict=True):
-            qpos[row.index, self._qpos] = recorded.initial_q
-            qvel[row.index, self._dofs] = recorded.initial_qd
+        for row in rows:
+            qpos[row.index, self._qpos] = row.initial_q
+            qvel[row.index, self._dofs] = row.initial_qd
         timestep = self.plant.timestep
         steps = int(np.ceil(max(row.duration for row in rows) / timestep)) + 1
         wants_tool = any(recorded.tracker_at is not None for _, recorded in work)
@@ -110,7 +115,9 @@ class Rollouts:
         at: Float64 = timestep * np.arange(steps, dtype=np.float64)
         for begin in range(0, steps, _CHUNK):
             end = min(begin + _CHUNK, steps)
-            ctrl = np.stack([row.command.held(at[begin:end]) for row in rows])
+            ctrl = np.zeros((len(rows), end - begin, self.model.nu))
+            for row in rows:
+                ctrl[row.index][:, self._columns] = row.command.held(at[begin:end])
             found = self._closed(ids, ctrl, laws, begin) if laws else self._open(ids, ctrl)
             q[:, begin + 1 : end + 1] = found[0]
             if tool is not None:  # sensors say where the tool was before the step
@@ -136,11 +143,16 @@ class Rollouts:
             duration=last,
             trajectory=recorded.trajectory,
             begin=recorded.begin,
+            earlier=recorded.earlier,
+            initial_q=recorded.initial_q,
+            initial_qd=recorded.initial_qd,
         )
         entry(row)
         known = self.plant.command
         if not known.is_direct:
             row.command = filtered(row.command.later(known.delay), known.filter, last)
+        for change in row.target_changes:
+            row.command = change(row.command)
         return row
 
     def _restore(self, rows: Sequence[Row]) -> None:
@@ -214,6 +226,12 @@ class Rollouts:
         if is_bad:
             report.pose = np.full_like(report.pose, np.nan)
         return Reports(joints.q, report.pose)
+
+
+def _controls(model: mujoco.MjModel, actuator: int) -> np.ndarray:
+    """Return which of the model's controls are an actuator's."""
+    first = int(model.actuator_ctrladr[actuator])
+    return np.arange(first, first + int(model.actuator_ctrlnum[actuator]))
 
 
 @dataclass

@@ -86,6 +86,15 @@ class Row:
     """Name of the recording."""
     begin: float
     """How far into the recording time 0 is (s)."""
+    earlier: tuple[str, ...]
+    """Names of the recordings made before it."""
+    initial_q: Float64
+    """float64[J], where the joints are at time 0 (rad, m); not to be changed in place."""
+    initial_qd: Float64
+    """float64[J] (rad/s, m/s)."""
+    target_changes: list[Callable[[Signal], Signal]] = dataclasses.field(
+        default_factory=list[Callable[[Signal], Signal]]
+    )
     tracker_time: Callable[[Float64], Float64] | None = None
     """Turns instants of the tracker's clock into true ones, if it is not right."""
     joints_reports: list[Callable[[JointsReport], None]] = dataclasses.field(
@@ -128,17 +137,15 @@ class Row:
 
     def drives_of(self, label: str) -> list[int]:
         """Return the actuators that act on one logged joint alone; none for a pose."""
-        joint = self.mj_joint(self.plant.mj_joint(label))
-        kinds, targets = self.model.actuator_trntype, self.model.actuator_trnid
-        return [
-            index
-            for index in range(self.model.nu)
-            if kinds[index] == mujoco.mjtTrn.mjTRN_JOINT and targets[index, 0] == joint
-        ]
+        return drives_of(self.plant, self.model, label)
 
     def torque(self, law: TorqueLaw, values: Float64) -> None:
         """Let a law act on this arm: float64[P] are its parameters."""
         self.laws.append((law, np.asarray(values, np.float64)))
+
+    def on_target(self, change: Callable[[Signal], Signal]) -> None:
+        """Change the command after the known delay and filter: what the servo compares with."""
+        self.target_changes.append(change)
 
     def on_joints(self, change: Callable[[JointsReport], None]) -> None:
         """Change what the robot logs of its joints."""
@@ -152,3 +159,13 @@ class Row:
         """Turn instants of the tracker's clock into true ones, on top of what others turn."""
         before = self.tracker_time
         self.tracker_time = change if before is None else lambda at: change(before(at))
+
+
+def drives_of(plant: Plant, model: mujoco.MjModel, label: str) -> list[int]:
+    """Return the actuators of a model that act on one logged joint alone; none for a pose."""
+    joint = int(model.joint(plant.mj_joint(label)).id)
+    return [
+        index
+        for index, kind in enumerate(model.actuator_trntype)
+        if kind == mujoco.mjtTrn.mjTRN_JOINT and model.actuator_trnid[index, 0] == joint
+    ]

@@ -1,0 +1,62 @@
+"""A joint whose encoder is not right: the log and the controller believe what it says."""
+
+import numpy as np
+
+from shared.sim.arm import Float64
+from shared.sim.plant.kinematics import tool_poses
+from shared.sim.plant.poses import conjugate, product
+from shared.sim.plant.row import JointsReport, Row
+from shared.sim.plant.signals import Signal, sampled
+
+
+def misread(row: Row, label: str, scale: float, offset: float) -> None:
+    """Let the encoder of a joint say ``scale * q + offset`` where the joint is at q.
+
+    A servo at the joint holds what the encoder says to its command. A controller of poses takes
+    its forward kinematics of the encoders: as far off as it was along the logged joints, so far
+    off is its target here; at which joint its force acts is left as if it knew the posture.
+
+    Args:
+        row: the arm.
+        label: the logged joint.
+        scale: 1 is right.
+        offset: 0 is right (rad, m).
+    """
+    joint = row.plant.labels.index(label)
+    row.initial_q = row.initial_q.copy()
+    row.initial_q[joint] = (row.initial_q[joint] - offset) / scale
+    row.initial_qd = row.initial_qd.copy()
+    row.initial_qd[joint] /= scale
+
+    def report(joints: JointsReport) -> None:
+        joints.q[:, joint] = scale * joints.q[:, joint] + offset
+
+    row.on_joints(report)
+    for actuator in row.drives_of(label):
+        bias = row.field("actuator_biasprm")[actuator]
+        bias[0] += bias[1] * row.model.actuator_gear[actuator, 0] * offset
+        bias[1:3] *= scale
+    if row.plant.control != "pose":
+        return
+    believed = row.logged_q
+    true = believed.values.copy()
+    true[:, joint] = (true[:, joint] - offset) / scale
+    row.logged_q = Signal(believed.at, true)
+
+    def follow(target: Signal) -> Signal:
+        return _as_if_at(row, target, believed, Signal(believed.at, true))
+
+    row.on_target(follow)
+
+
+def _as_if_at(row: Row, target: Signal, believed: Signal, true: Signal) -> Signal:
+    """Return the target that is as far from the true tool as the given one from the believed."""
+    at: Float64 = row.plant.timestep * np.arange(
+        int(np.ceil(row.duration / row.plant.timestep)) + 2, dtype=np.float64
+    )
+    seen = tool_poses(row.plant, row.model, sampled(believed.at, believed.values, at))
+    tool = tool_poses(row.plant, row.model, sampled(true.at, true.values, at))
+    out = target.held(at)
+    out[:, :3] += tool[:, :3] - seen[:, :3]
+    out[:, 3:] = product(out[:, 3:], product(conjugate(seen[:, 3:]), tool[:, 3:]))
+    return Signal(at, out)

@@ -1,0 +1,55 @@
+"""Rigid motions of many poses at once; a pose is position (m) and unit quaternion (w, x, y, z)."""
+
+import numpy as np
+
+from shared.sim.arm import Float64
+
+
+def product(one: Float64, other: Float64) -> Float64:
+    """Return float64[..., 4], the rotation ``other`` followed by ``one``."""
+    w, x, y, z = np.moveaxis(one, -1, 0)
+    a, b, c, d = np.moveaxis(other, -1, 0)
+    return np.stack(
+        [
+            w * a - x * b - y * c - z * d,
+            w * b + x * a + y * d - z * c,
+            w * c - x * d + y * a + z * b,
+            w * d + x * c - y * b + z * a,
+        ],
+        axis=-1,
+    )
+
+
+def conjugate(quaternions: Float64) -> Float64:
+    """Return float64[..., 4], the rotations back."""
+    return quaternions * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def rotated(quaternions: Float64, vectors: Float64) -> Float64:
+    """Return float64[..., 3], vectors turned by rotations."""
+    axis = quaternions[..., 1:]
+    twice = 2.0 * np.cross(axis, vectors)
+    return vectors + quaternions[..., :1] * twice + np.cross(axis, twice)
+
+
+def turn(vectors: Float64) -> Float64:
+    """Return float64[..., 4], the rotations of rotation vectors (rad)."""
+    half = 0.5 * np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * vectors], axis=-1)
+
+
+def seen_from(frames: Float64, poses: Float64) -> Float64:
+    """Return float64[..., 7]: poses that are given in frames, where the frames are given."""
+    at = frames[..., :3] + rotated(frames[..., 3:], poses[..., :3])
+    return np.concatenate([at, product(frames[..., 3:], poses[..., 3:])], axis=-1)
+
+
+def inverse(frames: Float64) -> Float64:
+    """Return float64[..., 7], the motions back."""
+    back = conjugate(frames[..., 3:])
+    return np.concatenate([-rotated(back, frames[..., :3]), back], axis=-1)
+
+
+def frame(values: Float64) -> Float64:
+    """Return float64[7] of a translation (m) and a rotation vector (rad): float64[6]."""
+    return np.concatenate([values[:3], turn(values[3:6])])
