@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shared.errors import IdentificationError
-from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource
+from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource, Trajectory
 from shared.sim.plant.plant import Control, Plant, mjcf, pr2
 from shared.sim.plant.rollouts import Recorded, Rollouts
 from shared.sim.plant.signals import Signal
@@ -30,6 +30,8 @@ class Subject:
     """float64[J], range of each joint over all trajectories (rad, m)."""
     speed: Float64
     """float64[J], speed that each joint exceeds 2 % of the time (rad/s, m/s)."""
+    recordings: tuple[Trajectory, ...] = ()
+    """What was recorded, in the order of recording."""
 
     @property
     def control(self) -> Control:
@@ -84,6 +86,7 @@ def subject_of(dataset: Dataset, capacity: int = 128) -> Subject:
         command_period=float(np.median(periods)) if len(periods) else 0.01,
         travel=np.ptp(q, axis=0),
         speed=np.quantile(np.concatenate(speeds), 0.98, axis=0),
+        recordings=dataset.trajectories,
     )
 
 
@@ -98,6 +101,7 @@ def recorded_of(dataset: Dataset) -> tuple[Recorded, ...]:
             joints_at=each.joints_at,
             tracker_at=each.tracker_at,
             trajectory=each.name,
+            earlier=tuple(other.name for other in dataset.trajectories[:index]),
         )
-        for each in dataset.trajectories
+        for index, each in enumerate(dataset.trajectories)
     )
