@@ -6,9 +6,14 @@ import numpy as np
 
 from shared.errors import IdentificationError
 from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource, Trajectory
+from shared.identification.motion import motion_of
+from shared.sim.plant.inverse import inverse_dynamics
 from shared.sim.plant.plant import Control, Plant, mjcf, pr2
 from shared.sim.plant.rollouts import Recorded, Rollouts
 from shared.sim.plant.signals import Signal
+
+_SPARSE = 5
+"""Of the instants of a motion, every so many say what torque it takes."""
 
 
 @dataclass(frozen=True)
@@ -28,8 +33,13 @@ class Subject:
     """Median (s)."""
     travel: Float64
     """float64[J], range of each joint over all trajectories (rad, m)."""
+    lowest: Float64
+    """float64[J], smallest position of each joint (rad, m)."""
     speed: Float64
     """float64[J], speed that each joint exceeds 2 % of the time (rad/s, m/s)."""
+    drive: Float64
+    """float64[J], torque that the recorded motion takes of each joint of the nominal arm, exceeded
+    2 % of the time (N m, N)."""
     recordings: tuple[Trajectory, ...] = ()
     """What was recorded, in the order of recording."""
 
@@ -71,10 +81,15 @@ def subject_of(dataset: Dataset, capacity: int = 128) -> Subject:
     plant = plant_of(dataset)
     nominal = Rollouts(plant, (), capacity)
     q = np.concatenate([each.q for each in dataset.trajectories])
-    speeds = [
-        np.abs(np.diff(each.q, axis=0)) / np.diff(each.joints_at)[:, None]
-        for each in dataset.trajectories
-    ]
+    motions = [motion_of(each) for each in dataset.trajectories]
+    speeds = np.concatenate([each.qd for each in motions])
+    drives = np.concatenate(
+        [
+            inverse_dynamics(plant, nominal.model, each.q[::_SPARSE], each.qd[::_SPARSE],
+                             each.qdd[::_SPARSE])
+            for each in motions
+        ]
+    )  # fmt: skip
     periods = np.concatenate([np.diff(each.command_at) for each in dataset.trajectories])
     return Subject(
         plant=plant,
@@ -85,7 +100,9 @@ def subject_of(dataset: Dataset, capacity: int = 128) -> Subject:
         duration=max(each.duration for each in dataset.trajectories),
         command_period=float(np.median(periods)) if len(periods) else 0.01,
         travel=np.ptp(q, axis=0),
-        speed=np.quantile(np.concatenate(speeds), 0.98, axis=0),
+        lowest=q.min(axis=0),
+        speed=np.quantile(np.abs(speeds), 0.98, axis=0),
+        drive=np.quantile(np.abs(drives), 0.98, axis=0),
         recordings=dataset.trajectories,
     )
 

@@ -1,0 +1,44 @@
+"""What a recording's joints do, smooth enough for speeds and accelerations."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shared.identification.dataset.types import Float64, Trajectory
+from shared.sim.plant.signals import sampled
+
+_PERIOD = 0.01
+"""Readings closer than this are thinned out (s)."""
+_SMOOTH = 0.1
+"""Readings that a speed is taken from, either side together (s)."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Positions, speeds and accelerations at even instants."""
+
+    q: Float64
+    """float64[T, J] (rad, m)."""
+    qd: Float64
+    """float64[T, J] (rad/s, m/s)."""
+    qdd: Float64
+    """float64[T, J] (rad/s^2, m/s^2)."""
+
+
+def motion_of(trajectory: Trajectory) -> Motion:
+    """Return a recording's motion from local fits of a cubic (Savitzky and Golay 1964).
+
+    A recording too short for one is taken to stand still.
+    """
+    at = trajectory.joints_at
+    period = max(_PERIOD, float(np.median(np.diff(at))))
+    even: Float64 = np.arange(float(at[0]), float(at[-1]), period, dtype=np.float64)
+    half = max(round(_SMOOTH / period / 2.0), 2)
+    if len(even) <= 2 * half:
+        still = np.zeros_like(trajectory.q)
+        return Motion(trajectory.q, still, still)
+    near = period * np.arange(-half, half + 1)
+    fit = np.linalg.pinv(np.vander(near, 4, increasing=True))
+    q = sampled(at, trajectory.q, even)
+    windows = np.lib.stride_tricks.sliding_window_view(q, 2 * half + 1, axis=0)
+    return Motion(windows @ fit[0], windows @ fit[1], 2.0 * windows @ fit[2])

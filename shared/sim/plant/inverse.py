@@ -1,0 +1,31 @@
+"""Torques that a recorded motion takes of the arm as the model has it."""
+
+import mujoco
+import numpy as np
+
+from shared.sim.arm import Float64
+from shared.sim.plant.plant import Plant
+
+
+def inverse_dynamics(
+    plant: Plant, model: mujoco.MjModel, q: Float64, qd: Float64, qdd: Float64
+) -> Float64:
+    """Return float64[T, J]: what the drives must put on the logged joints (N m, N).
+
+    Args:
+        plant: the arm.
+        model: of it, compiled.
+        q: float64[T, J] (rad, m).
+        qd: float64[T, J] (rad/s, m/s).
+        qdd: float64[T, J] (rad/s^2, m/s^2).
+    """
+    data = mujoco.MjData(model)
+    joints = [model.joint(name) for name in plant.joints]
+    places = np.array([int(joint.qposadr[0]) for joint in joints])
+    dofs = np.array([int(joint.dofadr[0]) for joint in joints])
+    out = np.empty_like(q)
+    for index in range(len(q)):
+        data.qpos[places], data.qvel[dofs], data.qacc[dofs] = q[index], qd[index], qdd[index]
+        mujoco.mj_inverse(model, data)
+        out[index] = data.qfrc_inverse[dofs]
+    return out
