@@ -12,8 +12,15 @@ import numpy as np
 
 from shared.sim.arena import BASE_YAW
 from shared.sim.arm import Arm, Float64, Inertial, combine, load_arm, load_stance
-from shared.sim.config import SimConfig
-from shared.sim.parameters import BatParameters, ModelParameters
+from shared.sim.config import JointName, SimConfig
+from shared.sim.parameters import (
+    AxisGains,
+    BatParameters,
+    LinkMass,
+    ModelParameters,
+    ResidualSpring,
+    TorqueBias,
+)
 
 AGENTS: Final = ("antagonist", "protagonist")
 """Index 0 and 1 wherever agents are in an array."""
@@ -30,6 +37,8 @@ _AXES: Final = "xyz"
 _STRUCK: Final = {"upper_arm_roll": 0.32, "forearm_roll": 0.26, "wrist_roll": 0.16}
 """Links of an arm that the other's bat can reach, and how long they are (m)."""
 _STRUCK_RADIUS: Final = 0.06
+_SOFT: Final = 1e-9
+"""Stiffness of a spring that stands for a constant torque (N m/rad)."""
 
 
 def base_position(cfg: SimConfig) -> Float64:
@@ -101,13 +110,13 @@ def _add_robot(
         hinge.actfrcrange = [-values.torque_limit, values.torque_limit]
         if joint.range is not None:
             hinge.range = joint.range
-        for extension in parameters.extensions:
-            if extension.joint == joint.name:
-                hinge.stiffness[0] = extension.stiffness
-                hinge.springref = extension.angle
+        _add_spring(hinge, parameters, joint.name)
         inertial = joint.inertial
         if joint.name == "wrist_roll":
             inertial = combine([inertial, bat_inertial(parameters.bat, arm)])
+        if (link := parameters.of_kind(LinkMass, joint.name)) is not None:
+            heavy = inertial.inertia * link.factor
+            inertial = Inertial(inertial.mass * link.factor, inertial.com, heavy)
         _set_inertial(body, inertial)
         if cfg.bat_arm_contacts and joint.name in _STRUCK:
             body.add_geom(
@@ -120,6 +129,24 @@ def _add_robot(
             )
     body.add_site(name=f"{agent}/tool", pos=arm.tool)
     _add_bat(body, parameters.bat, arm, agent)
+
+
+def _add_spring(hinge: mujoco.MjsJoint, parameters: ModelParameters, joint: JointName) -> None:
+    """Add what acts on a joint by its position alone, as the one spring that a hinge may have.
+
+    A constant torque is a very soft spring far off.
+    """
+    spring = parameters.of_kind(ResidualSpring, joint)
+    bias = parameters.of_kind(TorqueBias, joint)
+    if bias is None:
+        if spring is not None:
+            hinge.stiffness[0] = spring.stiffness
+            hinge.springref = spring.angle
+        return
+    stiffness = _SOFT if spring is None else max(spring.stiffness, _SOFT)
+    at_zero = bias.torque + (0.0 if spring is None else spring.stiffness * spring.angle)
+    hinge.stiffness[0] = stiffness
+    hinge.springref = at_zero / stiffness
 
 
 def _set_inertial(body: mujoco.MjsBody, inertial: Inertial) -> None:
@@ -173,7 +200,8 @@ def _add_servo(spec: mujoco.MjSpec, parameters: ModelParameters, agent: str) -> 
             target=target,
             refsite=reference,
         )
-        servo.set_to_position(kp=translation.kp, kv=translation.kv)
+        own = parameters.of_kind(AxisGains, _AXES[axis]) or translation
+        servo.set_to_position(kp=own.kp, kv=own.kv)
         servo.gear = [float(axis == other) for other in range(6)]
     servo = spec.add_actuator(
         name=f"{agent}/orientation",
@@ -182,7 +210,8 @@ def _add_servo(spec: mujoco.MjSpec, parameters: ModelParameters, agent: str) -> 
         refsite=reference,
     )
     chart = mujoco.mjtCtrlChart.mjCHART_QUAT
-    servo.set_to_orientation(kp=orientation.kp, kv=orientation.kv, ctrlspec=chart)
+    own = parameters.of_kind(AxisGains, "orientation") or orientation
+    servo.set_to_orientation(kp=own.kp, kv=own.kv, ctrlspec=chart)
 
 
 def _add_sensors(spec: mujoco.MjSpec, agent: str) -> None:

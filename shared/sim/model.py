@@ -131,10 +131,10 @@ def _hash(xml: str, cfg: SimConfig, parameters: ModelParameters) -> str:
 
     The text of the compiled model catches a change of this code or of the arm's data, the exact
     parameters one that its digits would hide. Not the compiled bytes: their last bits depend on
-    the processor. The name of the model and the place of its file are left out: they move nothing.
+    the processor. The name of the model, the place of its file and what it says of measurement are
+    left out: they move nothing.
     """
-    exact = (
-        msgspec.structs.replace(cfg, model=""),
-        msgspec.structs.replace(parameters, name=""),
-    )
+    moving: dict[str, object] = msgspec.to_builtins(msgspec.structs.replace(parameters, name=""))
+    del moving["measurement"]
+    exact = (msgspec.structs.replace(cfg, model=""), moving)
     return hashlib.sha256(xml.encode() + msgspec.json.encode(exact)).hexdigest()

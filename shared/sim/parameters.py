@@ -7,7 +7,7 @@ recording could correct is here. The structs are frozen; a changed model is a ne
 import math
 import re
 from pathlib import Path
-from typing import Final, get_args
+from typing import Final, Literal, TypeVar, get_args
 
 import msgspec
 import tomli_w
@@ -20,6 +20,10 @@ SCHEMA: Final = 1
 
 JOINT_NAMES: Final[tuple[JointName, ...]] = get_args(JointName)
 """The seven joints of an arm, from the torso to the gripper."""
+
+Axis = Literal["x", "y", "z", "orientation"]
+"""A direction of the servo; its frame is the torso's."""
+Kind = TypeVar("Kind", bound="Extension")
 
 _DATA: Final = Path(__file__).parent / "data"
 
@@ -145,8 +149,62 @@ class ResidualSpring(
         _within("angle", self.angle, -2 * math.pi, 2 * math.pi)
 
 
-Extension = ResidualSpring
+class TorqueBias(
+    msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="torque_bias"
+):
+    """A constant torque at a joint: an offset of its drive."""
+
+    joint: JointName
+    torque: float
+    """N m."""
+
+    def __post_init__(self) -> None:
+        _within("torque", self.torque, -100.0, 100.0)
+
+
+class LinkMass(
+    msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="link_mass"
+):
+    """A link that is heavier or lighter than the data sheet says; the last one has the bat."""
+
+    joint: JointName
+    """That carries the link."""
+    factor: float
+    """Of mass and inertia."""
+
+    def __post_init__(self) -> None:
+        _within("factor", self.factor, 0.05, 100.0)
+
+
+class AxisGains(
+    msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="axis_gains"
+):
+    """Gains of one direction of the servo in place of the table's."""
+
+    axis: Axis
+    kp: float
+    """N/m."""
+    kv: float
+    """N s/m."""
+
+    def __post_init__(self) -> None:
+        _within("kp", self.kp, 0.0, 1e5)
+        _within("kv", self.kv, 0.0, 1e4)
+
+
+Extension = ResidualSpring | TorqueBias | LinkMass | AxisGains
 """Union of the physical effects a model may add to the nominal one, told apart by ``type``."""
+
+
+class Measured(_Section, frozen=True):
+    """A cause on the side of measurement: it changes what is logged, and nothing that moves."""
+
+    effect: str
+    """As identification calls it: ``tracker_latency``."""
+    where: str
+    """Joint; empty: the whole arm, or the tracker."""
+    values: dict[str, float]
+    """By quantity, SI."""
 
 
 class ModelParameters(_Section, frozen=True):
@@ -160,14 +218,28 @@ class ModelParameters(_Section, frozen=True):
     bat: BatParameters
     joints: ArmParameters
     extensions: tuple[Extension, ...] = ()
-    """Effects beyond the nominal model; each kind may be given once per joint."""
+    """Effects beyond the nominal model; each kind may be given once per joint or axis."""
+    measurement: tuple[Measured, ...] = ()
+    """What recordings get wrong, for who calibrates sensors; no part of the physics or its hash."""
 
     def __post_init__(self) -> None:
         if self.schema != SCHEMA:
             raise ValueError(f"schema must be {SCHEMA}, got {self.schema}")
-        seen = [(type(extension), extension.joint) for extension in self.extensions]
+        seen = [(type(each), place_of(each)) for each in self.extensions]
         if len(set(seen)) < len(seen):
-            raise ValueError("extensions names one kind twice for the same joint")
+            raise ValueError("extensions names one kind twice for the same joint or axis")
+
+    def of_kind(self, kind: type[Kind], place: str) -> Kind | None:
+        """Return the extension of one kind at a joint or an axis, None where there is none."""
+        for each in self.extensions:
+            if isinstance(each, kind) and place_of(each) == place:
+                return each
+        return None
+
+
+def place_of(extension: Extension) -> str:
+    """Return the joint or the axis that an extension is for."""
+    return extension.axis if isinstance(extension, AxisGains) else extension.joint
 
 
 def load_parameters(source: str | Path) -> ModelParameters:
@@ -196,7 +268,8 @@ def load_parameters(source: str | Path) -> ModelParameters:
 
 def dump_parameters(parameters: ModelParameters) -> str:
     """Return ``parameters`` as the text of a ``model.toml``."""
-    return tomli_w.dumps(msgspec.to_builtins(parameters, builtin_types=()))
+    tables = msgspec.to_builtins(parameters, builtin_types=())
+    return tomli_w.dumps({key: value for key, value in tables.items() if value != []})
 
 
 def _readable(message: str) -> str:
