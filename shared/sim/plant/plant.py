@@ -121,7 +121,7 @@ def mjcf(
             raise IdentificationError(
                 f"{path} has no joint {name!r}, which the log has; it has: {', '.join(known)}"
             )
-        if compiled.jnt_type[known[name]] not in _JOINTS:
+        if int(compiled.jnt_type[known[name]]) not in _JOINTS:
             raise IdentificationError(f"{path}: joint {name!r} is no hinge or slide")
     if missing := [name for name in known if name not in joints]:
         raise IdentificationError(

@@ -11,6 +11,7 @@ import numpy as np
 from shared.sim.arm import Float64
 from shared.sim.plant.plant import Plant
 from shared.sim.plant.signals import Signal
+from shared.sim.plant.structure import STIFF, armature_for
 
 
 @dataclass
@@ -138,6 +139,21 @@ class Row:
     def drives_of(self, label: str) -> list[int]:
         """Return the actuators that act on one logged joint alone; none for a pose."""
         return drives_of(self.plant, self.model, label)
+
+    def spring(self, name: str, compliance: float, ringing: float) -> None:
+        """Let an added joint give.
+
+        Args:
+            name: in the MJCF.
+            compliance: rad/(N m); 0 does not give.
+            ringing: damping as a share of the square root of the stiffness (sqrt(kg) m).
+        """
+        joint = self.mj_joint(name)
+        dof = int(self.model.jnt_dofadr[joint])
+        stiffness = min(1.0 / max(compliance, 1e-12), STIFF)
+        self.field("jnt_stiffness")[joint] = stiffness
+        self.field("dof_damping")[dof] = ringing * stiffness**0.5
+        self.field("dof_armature")[dof] = armature_for(stiffness, self.plant.timestep)
 
     def torque(self, law: TorqueLaw, values: Float64) -> None:
         """Let a law act on this arm: float64[P] are its parameters."""

@@ -3,16 +3,24 @@
 A structure is a tuple of edits. Two variants with the same edits share a compiled model.
 """
 
+import copy
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import mujoco
+import numpy as np
 
 from shared.sim.plant.plant import Plant
 
 STIFF = 1e9
-"""Of an added spring until an effect sets it (N m/rad)."""
+"""Of an added spring until an effect sets it, and the most there is (N m/rad)."""
+_JOINT = (
+    "type", "pos", "axis", "ref", "range", "limited", "margin", "stiffness", "springref",
+    "springdamper", "damping", "armature", "frictionloss", "actfrcrange", "actfrclimited",
+    "actgravcomp", "solref_limit", "solimp_limit", "solref_friction", "solimp_friction", "group",
+)  # fmt: skip
+"""All that a joint of an MJCF says of itself but its name."""
 
 
 @dataclass(frozen=True)
@@ -44,22 +52,67 @@ class Builder:
         """Put a second joint between a logged joint's motor and its link.
 
         The first joint keeps name, motor, armature, friction and damping: it is what the encoder
-        sees. The second, ``NAME/series``, has the same axis and a spring that an effect sets.
+        sees. The second, ``NAME/series``, has the same axis and is as good as locked until an
+        effect calls :meth:`Row.spring`.
         """
         motor = self.spec.joint(self.plant.mj_joint(label))
         made = motor.parent.add_joint(
             name=series_name(self.plant, label), type=motor.type, axis=motor.axis, pos=motor.pos
         )
-        made.stiffness[0] = STIFF
-        made.damping[0] = math.sqrt(STIFF) * 1e-3
+        self._lock(made)
 
     def base_joint(self, axis: tuple[float, float, float], name: str) -> None:
-        """Let what the arm stands on turn about an axis at its origin, against a spring."""
-        made = self.spec.body(self.plant.base_body).add_joint(
-            name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis
-        )
-        made.stiffness[0] = STIFF
-        made.armature = 1.0
+        """Let what the arm stands on turn about an axis at its origin, before anything else moves.
+
+        As good as locked until an effect calls :meth:`Row.spring`. What a tracker is measured from
+        stays where it was.
+        """
+        body = self.spec.body(self.plant.base_body)
+        made = body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
+        self._lock(made)
+        joints = list(body.joints)
+        kept = [{field: _copied(joint, field) for field in _JOINT} for joint in joints]
+        names = [joint.name for joint in joints]
+        for index, joint in enumerate(joints):
+            joint.name = f"{name} {index}"
+        for joint, values, own in zip(
+            joints, (kept[-1], *kept[:-1]), (names[-1], *names[:-1]), strict=True
+        ):
+            joint.name = own
+            for field, value in values.items():
+                setattr(joint, field, value)
+        self._fix_tracker(body)
+        # What stands still may have no mass, what moves must.
+        self.spec.compiler.boundmass = max(self.spec.compiler.boundmass, 1e-6)
+        self.spec.compiler.boundinertia = max(self.spec.compiler.boundinertia, 1e-9)
+
+    def _lock(self, joint: mujoco.MjsJoint) -> None:
+        joint.stiffness[0] = STIFF
+        joint.damping[0] = math.sqrt(STIFF)
+        joint.armature = armature_for(STIFF, self.plant.timestep)
+
+    def _fix_tracker(self, body: mujoco.MjsBody) -> None:
+        """Measure the tracker from the world if it is measured from a site of this body."""
+        for sensor in self.spec.sensors:
+            site = self.spec.site(sensor.refname) if sensor.refname else None
+            if site is None or site.parent.name != body.name:
+                continue
+            fixed = f"{sensor.refname}/fixed"
+            if self.spec.site(fixed) is None:
+                turned = np.empty(4)
+                place = np.empty(3)
+                mujoco.mju_mulQuat(turned, body.quat, site.quat)
+                mujoco.mju_rotVecQuat(place, site.pos, body.quat)
+                self.spec.worldbody.add_site(name=fixed, pos=body.pos + place, quat=turned)
+            sensor.refname = fixed
+
+
+def armature_for(stiffness: float, timestep: float) -> float:
+    """Return the armature with which a spring is stable whatever it carries (kg m^2).
+
+    MuJoCo takes springs explicitly: k h^2 / I must stay below 4. Slow motion does not feel it.
+    """
+    return 0.5 * stiffness * timestep**2
 
 
 def series_name(plant: Plant, label: str) -> str:
@@ -73,3 +126,7 @@ def compiled(plant: Plant, structure: Structure) -> mujoco.MjModel:
     for edit in structure:
         edit.change(builder)
     return builder.spec.compile()
+
+
+def _copied(joint: mujoco.MjsJoint, field: str) -> object:
+    return copy.copy(getattr(joint, field))  # arrays are views of the spec
