@@ -1,0 +1,76 @@
+"""Something pushed the arm once."""
+
+import numpy as np
+
+from shared.identification.dataset.types import Float64
+from shared.identification.effect import Quantity, Side
+from shared.identification.places import place_of
+from shared.identification.subject import Subject
+from shared.sim.plant.row import Row, Step
+from shared.sim.plant.structure import Structure
+
+_IN = " in "
+"""Between the joint and the recording in the name of a place."""
+
+
+class _Push:
+    """A constant torque within a window of time, of one joint; values: begin, end, torques."""
+
+    memory = 0
+
+    def __call__(self, step: Step, values: Float64, memory: Float64) -> Float64:
+        begin, end = values[:, 0], values[:, 1]
+        # The part of the step that is in the window: so that its ends need not be on the grid.
+        inside = np.minimum(end, step.time + step.timestep) - np.maximum(begin, step.time)
+        share = np.clip(inside / step.timestep, 0.0, 1.0)
+        return share[:, None] * values[:, 2:]
+
+
+_PUSH = _Push()
+
+
+class ExternalContact:
+    """One push: a torque at one joint, during one window of one recording."""
+
+    name = "external_contact"
+    title = "something pushed the arm"
+    signature = "One event in one recording, as if a torque acted from one instant to another."
+    side: Side = "plant"
+
+    def places(self, subject: Subject) -> tuple[str, ...]:
+        """Return every joint in every recording: ``elbow in swings``."""
+        return tuple(
+            f"{joint}{_IN}{trajectory}"
+            for trajectory in subject.trajectories
+            for joint in subject.joints
+        )
+
+    def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
+        """Return the torque and its window: the probe pushes for half a second in the middle."""
+        joint = place_of(subject, place.split(_IN, 1)[0])
+        most = 20.0 * joint.drive
+        return (
+            Quantity("torque", joint.torque, -most, most, probe=0.5 * joint.drive),
+            Quantity(
+                "begin", "s", 0.0, subject.duration, probe=0.5 * subject.duration, is_smooth=False
+            ),
+            Quantity("length", "s", 0.0, subject.duration, probe=0.5, is_smooth=False),
+        )
+
+    def structure(self, subject: Subject, place: str) -> Structure:
+        """Return nothing: it is a torque."""
+        return ()
+
+    def enter(self, row: Row, place: str, values: Float64) -> None:
+        """Push the joint, if this is the recording; instants are the recording's."""
+        joint, trajectory = place.split(_IN, 1)
+        torque, begin, length = (float(value) for value in values)
+        if trajectory != row.trajectory or torque == 0.0 or length <= 0.0:
+            return
+        torques = np.zeros(len(row.plant.labels))
+        torques[row.plant.labels.index(joint)] = torque
+        begin -= row.begin
+        row.torque(_PUSH, np.concatenate([[begin, begin + length], torques]))
+
+
+EFFECT = ExternalContact()
