@@ -16,6 +16,8 @@ LONGEST: Final = 86_400.0
 """Of a recording (s)."""
 FASTEST_HZ: Final = 50_000.0
 """Rows a second that a real log has at most."""
+LARGEST_VALUE: Final = 1e9
+"""Of anything, in any unit."""
 LARGEST_ANGLE: Final = 4.0 * np.pi
 """Of a joint on most rows (rad), unless it turns without end."""
 LARGEST_RANGE: Final = 60.0
@@ -88,18 +90,19 @@ def check_time(table: Table) -> None:
 
 
 def check_finite(table: Table, names: Sequence[str]) -> None:
-    """Check that columns hold finite numbers.
+    """Check that columns hold finite numbers of some sense.
 
     Raises:
         IdentificationError: one does not; names column and row.
     """
     for name in names:
-        bad = ~np.isfinite(table.columns[name])
+        bad = ~(np.abs(table.columns[name]) <= LARGEST_VALUE)
         if bad.any():
             row = int(np.argmax(bad))
             raise IdentificationError(
                 f"{table.path}: column {name!r}, row {row} is {table.columns[name][row]} "
-                f"({int(bad.sum())} of {len(bad)} rows are no finite numbers): leave such rows out"
+                f"({int(bad.sum())} of {len(bad)} rows are no numbers up to {LARGEST_VALUE:g}): "
+                "leave such rows out"
             )
 
 
@@ -174,19 +177,23 @@ def check_positions(table: Table, name: str, joint: str, is_continuous: bool) ->
         IdentificationError: they are too large.
     """
     values = table.columns[name]
-    span = float(values.max() - values.min())
-    share = float(np.mean(np.abs(values) > LARGEST_ANGLE))
-    if is_continuous or not (share > 0.5 or span > LARGEST_RANGE):
+    if is_continuous or not is_too_large(values):
         return
-    what = (
-        f"spans {span:.4g}" if span > LARGEST_RANGE
-        else f"is over 4 pi on {share:.0%} of the rows (row 0: {values[0]:.4g})"
-    )  # fmt: skip
+    span = float(np.ptp(values))
+    what = f"spans {span:.4g}"
+    if span <= LARGEST_RANGE:
+        what = f"is over 4 pi on most rows (row 0: {values[0]:.4g})"
     raise IdentificationError(
         f"{table.path}: column {name!r} {what}, which is no angle in rad and no way in m: are "
         f"these degrees or mm? If {joint!r} turns without end, add it to continuous = [...] in "
         "dataset.toml"
     )
+
+
+def is_too_large(q: Float64) -> bool:
+    """Return whether float64[T] are no positions in rad or m of a joint with limits."""
+    share = float(np.mean(np.abs(q) > LARGEST_ANGLE))
+    return share > 0.5 or float(np.ptp(q)) > LARGEST_RANGE
 
 
 def check_velocities(path: Path, joint: str, times: Float64, q: Float64, qd: Float64) -> None:
