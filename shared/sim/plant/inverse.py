@@ -1,5 +1,7 @@
 """Torques that a recorded motion takes of the arm as the model has it."""
 
+import copy
+
 import mujoco
 import numpy as np
 
@@ -8,9 +10,16 @@ from shared.sim.plant.plant import Plant
 
 
 def inverse_dynamics(
-    plant: Plant, model: mujoco.MjModel, q: Float64, qd: Float64, qdd: Float64
+    plant: Plant,
+    model: mujoco.MjModel,
+    q: Float64,
+    qd: Float64,
+    qdd: Float64,
+    is_of_links: bool = False,
 ) -> Float64:
     """Return float64[T, J]: what the drives must put on the logged joints (N m, N).
+
+    Joints that are not logged stand where the model has them.
 
     Args:
         plant: the arm.
@@ -18,7 +27,14 @@ def inverse_dynamics(
         q: float64[T, J] (rad, m).
         qd: float64[T, J] (rad/s, m/s).
         qdd: float64[T, J] (rad/s^2, m/s^2).
+        is_of_links: leave out what armature, damping and friction take: what reaches the links.
     """
+    if is_of_links:
+        model = copy.copy(model)
+        for field in (
+            model.dof_armature, model.dof_damping, model.dof_dampingpoly, model.dof_frictionloss
+        ):  # fmt: skip
+            field[:] = 0.0
     data = mujoco.MjData(model)
     joints = [model.joint(name) for name in plant.joints]
     places = np.array([int(joint.qposadr[0]) for joint in joints])

@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import mujoco
 import mujoco.batch
@@ -11,12 +12,14 @@ import numpy as np
 from shared.sim.arm import Float64
 from shared.sim.model import silence
 from shared.sim.plant.plant import TOOL, Plant
-from shared.sim.plant.row import JointsReport, Row, Step, TorqueLaw, TrackerReport
+from shared.sim.plant.row import FrictionLaw, JointsReport, Row, Step, TorqueLaw, TrackerReport
 from shared.sim.plant.signals import Signal, filtered, sampled, sampled_poses
 from shared.sim.plant.structure import Structure, compiled
 
 _CHUNK = 250
 """Steps that a batch takes between two looks at what it recorded."""
+_STICKS = (0.999, 0.9999)
+"""Impedance of dry friction, at least: MuJoCo's 0.9 lets a stuck joint creep 100 times as fast."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,8 @@ class Reports:
     """float64[K, 7]."""
 
 
+_Law = TypeVar("_Law", TorqueLaw, FrictionLaw)
+
 Entry = Callable[[Row], None]
 """Lets base parameters and effects into one arm."""
 
@@ -70,6 +75,8 @@ class Rollouts:
         self.plant = plant
         self.capacity = capacity
         self.model = compiled(plant, structure)
+        for impedance in (self.model.dof_solimp, self.model.tendon_solimp_fri):
+            impedance[:, :2] = np.maximum(impedance[:, :2], _STICKS)
         self._joints = [self.model.joint(name) for name in plant.joints]
         self._qpos = np.array([int(joint.qposadr[0]) for joint in self._joints])
         self._dofs = np.array([int(joint.dofadr[0]) for joint in self._joints])
@@ -111,14 +118,19 @@ class Rollouts:
         q = np.empty((len(rows), steps + 1, len(self._qpos)))
         tool = np.empty((len(rows), steps + 1, 7)) if wants_tool else None
         q[:, 0] = qpos[ids][:, self._qpos]
-        laws = _by_law(rows)
+        laws, frictions = _torques(rows), _frictions(rows)
+        has_laws = bool(laws or frictions)
         at: Float64 = timestep * np.arange(steps, dtype=np.float64)
         for begin in range(0, steps, _CHUNK):
             end = min(begin + _CHUNK, steps)
             ctrl = np.zeros((len(rows), end - begin, self.model.nu))
             for row in rows:
                 ctrl[row.index][:, self._columns] = row.command.held(at[begin:end])
-            found = self._closed(ids, ctrl, laws, begin) if laws else self._open(ids, ctrl)
+            found = (
+                self._closed(ids, ctrl, laws, frictions, begin)
+                if has_laws
+                else self._open(ids, ctrl)
+            )
             q[:, begin + 1 : end + 1] = found[0]
             if tool is not None:  # sensors say where the tool was before the step
                 tool[:, begin:end] = found[1]
@@ -179,7 +191,12 @@ class Rollouts:
         return found["qpos"][:, :, self._qpos], found["sensordata"][:, :, self._tool]
 
     def _closed(
-        self, ids: np.ndarray, ctrl: Float64, laws: "list[_Active]", begin: int
+        self,
+        ids: np.ndarray,
+        ctrl: Float64,
+        laws: "list[_Active]",
+        frictions: "list[_Rubbing]",
+        begin: int,
     ) -> tuple[Float64, Float64]:
         batch = self._batch
         qpos, qvel, control = batch.bind("qpos"), batch.bind("qvel"), batch.bind("ctrl")
@@ -188,10 +205,18 @@ class Rollouts:
         count = ctrl.shape[1]
         q = np.empty((len(ids), count, len(self._qpos)))
         tool = np.empty((len(ids), count, 7))
+        rubs = self._expanded["dof_frictionloss"] if frictions else np.empty(0)
+        joints = np.ix_(ids, self._dofs)
+        constant = rubs[joints] if frictions else rubs
+        if begin == 0:  # what the drives do and hold before the first step
+            control[ids] = ctrl[:, 0]
+            batch.forward(ids)
         for index in range(count):
             control[ids] = ctrl[:, index]
             applied[ids] = 0.0
-            for active in laws:
+            if frictions:
+                rubs[joints] = constant
+            for active in (*laws, *frictions):
                 pick = np.ix_(active.rows, self._dofs)
                 step = Step(
                     time=(begin + index) * self.plant.timestep,
@@ -201,10 +226,15 @@ class Rollouts:
                     drive=drive[pick],
                     gravity=bias[pick],
                 )
-                applied[pick] += active.law(step, active.values, active.memory)
+                if isinstance(active, _Rubbing):
+                    rubs[pick] += active.law(step, active.values)
+                else:
+                    applied[pick] += active.law(step, active.values, active.memory)
             batch.step(ids)
             q[:, index] = qpos[np.ix_(ids, self._qpos)]
             tool[:, index] = sensors[ids][:, self._tool]
+        if frictions:
+            rubs[joints] = constant
         return q, tool
 
     def _reports(
@@ -242,21 +272,41 @@ class _Active:
     memory: Float64
 
 
-def _by_law(rows: Sequence[Row]) -> list[_Active]:
-    """Return the laws at work, each with the arms that it acts on; at most once an arm."""
-    groups: dict[tuple[TorqueLaw, int], list[tuple[int, Float64]]] = defaultdict(list)
-    for row in rows:
-        seen: dict[TorqueLaw, int] = defaultdict(int)
-        for law, values in row.laws:
-            groups[law, seen[law]].append((row.index, values))
+@dataclass
+class _Rubbing:
+    law: FrictionLaw
+    rows: np.ndarray
+    values: Float64
+
+
+def _torques(rows: Sequence[Row]) -> list[_Active]:
+    """Return the torques at work, each with the arms that it acts on."""
+    return [
+        _Active(law, members, values, np.zeros((len(members), law.memory)))
+        for law, members, values in _by_law([(row.index, row.laws) for row in rows])
+    ]
+
+
+def _frictions(rows: Sequence[Row]) -> list[_Rubbing]:
+    """Return the frictions at work, each with the arms that it acts on."""
+    return [
+        _Rubbing(law, members, values)
+        for law, members, values in _by_law([(row.index, row.frictions) for row in rows])
+    ]
+
+
+def _by_law(
+    rows: Sequence[tuple[int, list[tuple[_Law, Float64]]]],
+) -> list[tuple[_Law, np.ndarray, Float64]]:
+    """Return each law with arms and values; several times if an arm has it several times."""
+    groups: dict[tuple[_Law, int], list[tuple[int, Float64]]] = defaultdict(list)
+    for index, laws in rows:
+        seen: dict[_Law, int] = defaultdict(int)
+        for law, values in laws:
+            groups[law, seen[law]].append((index, values))
             seen[law] += 1
     return [
-        _Active(
-            law,
-            np.array([index for index, _ in group]),
-            np.stack([values for _, values in group]),
-            np.zeros((len(group), law.memory)),
-        )
+        (law, np.array([index for index, _ in group]), np.stack([values for _, values in group]))
         for (law, _), group in groups.items()
     ]
 

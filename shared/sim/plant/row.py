@@ -49,6 +49,19 @@ class TorqueLaw(Protocol):
         ...
 
 
+class FrictionLaw(Protocol):
+    """Coulomb friction that depends on what the arm does; the solver lets it stick."""
+
+    def __call__(self, step: Step, values: Float64) -> Float64:
+        """Return float64[K, J], at least 0, to be added to the joints' friction (N m, N).
+
+        Args:
+            step: the state.
+            values: float64[K, P], what the effect gave to :meth:`Row.friction`.
+        """
+        ...
+
+
 @dataclass
 class JointsReport:
     """What the robot would log."""
@@ -107,6 +120,9 @@ class Row:
     laws: list[tuple[TorqueLaw, Float64]] = dataclasses.field(
         default_factory=list[tuple[TorqueLaw, Float64]]
     )
+    frictions: list[tuple[FrictionLaw, Float64]] = dataclasses.field(
+        default_factory=list[tuple[FrictionLaw, Float64]]
+    )
     fields: dict[str, Float64] = dataclasses.field(default_factory=dict[str, Float64])
 
     def field(self, name: str) -> Float64:
@@ -158,6 +174,11 @@ class Row:
     def torque(self, law: TorqueLaw, values: Float64) -> None:
         """Let a law act on this arm: float64[P] are its parameters."""
         self.laws.append((law, np.asarray(values, np.float64)))
+
+    def friction(self, law: FrictionLaw, values: Float64) -> None:
+        """Let joints of this arm rub by a law: float64[P] are its parameters."""
+        self.field("dof_frictionloss")
+        self.frictions.append((law, np.asarray(values, np.float64)))
 
     def on_target(self, change: Callable[[Signal], Signal]) -> None:
         """Change the command after the known delay and filter: what the servo compares with."""

@@ -1,0 +1,41 @@
+"""A joint rubs by the same torque however fast it moves, and sticks when it stands."""
+
+from shared.identification.dataset.types import Float64
+from shared.identification.effect import Quantity, Side
+from shared.identification.passive import add_friction
+from shared.identification.places import moving, place_of
+from shared.identification.subject import Subject
+from shared.sim.plant.row import Row
+from shared.sim.plant.structure import Structure
+
+
+class CoulombFriction:
+    """Dry friction of a joint whose model has none; where there is some, the base fit has it."""
+
+    name = "coulomb_friction"
+    title = "the joint has dry friction"
+    signature = "A step at each reversal, the same at any speed; the joint sticks when it stands."
+    side: Side = "plant"
+
+    def places(self, subject: Subject) -> tuple[str, ...]:
+        """Return the joints that move and have no friction; a PR2's are fitted in any case."""
+        if subject.control == "pose":
+            return ()
+        known = subject.nominal.model.dof_frictionloss
+        return tuple(place.label for place in moving(subject) if known[place.dof] == 0.0)
+
+    def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
+        """Return the level."""
+        joint = place_of(subject, place)
+        return (Quantity("level", joint.torque, 0.0, 2.0 * joint.drive, probe=0.1 * joint.drive),)
+
+    def structure(self, subject: Subject, place: str) -> Structure:
+        """Return nothing: every joint may rub."""
+        return ()
+
+    def enter(self, row: Row, place: str, values: Float64) -> None:
+        """Let the joint rub."""
+        add_friction(row, place, float(values[0]))
+
+
+EFFECT = CoulombFriction()
