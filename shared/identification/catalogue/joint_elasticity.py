@@ -1,10 +1,18 @@
 """A joint's belt or gear gives between motor and link."""
 
+import math
+
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
+from shared.identification.places import moving, place_of
+from shared.identification.series import hide_from_controller, link_inertia, series
 from shared.identification.subject import Subject
 from shared.sim.plant.row import Row
-from shared.sim.plant.structure import Builder, Edit, Structure, series_name
+from shared.sim.plant.structure import Structure, series_name
+
+_PART = "series"
+_DAMPING = 0.1
+"""Of critical."""
 
 
 class JointElasticity:
@@ -17,24 +25,27 @@ class JointElasticity:
 
     def places(self, subject: Subject) -> tuple[str, ...]:
         """Return the joints that move."""
-        moves = subject.travel > 0.05
-        return tuple(name for name, is_moved in zip(subject.joints, moves, strict=True) if is_moved)
+        return tuple(place.label for place in moving(subject))
 
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
         """Return how far it gives; the inverse of a stiffness, so that 0 is rigid."""
-        return (Quantity("compliance", "rad/(N m)", 0.0, 0.1, probe=0.002),)
+        joint = place_of(subject, place)
+        far = (0.02 if joint.is_sliding else 0.2) / joint.drive
+        unit = f"{joint.angle}/({joint.torque})"
+        return (Quantity("compliance", unit, 0.0, 2.0 * far, probe=0.05 * far),)
 
     def structure(self, subject: Subject, place: str) -> Structure:
         """Return the second joint."""
-
-        def change(builder: Builder) -> None:
-            builder.series_joint(place)
-
-        return (Edit(f"series {place}", change),)
+        return (series(place, _PART),)
 
     def enter(self, row: Row, place: str, values: Float64) -> None:
-        """Set the spring; its damping is small: a tenth of critical at 0.01 kg m^2."""
-        row.spring(series_name(row.plant, place), float(values[0]), ringing=0.02)
+        """Set the spring."""
+        compliance = float(values[0])
+        name = series_name(row.plant, place, _PART)
+        inertia = link_inertia(row, row.mj_joint(name))
+        row.spring(name, compliance, ringing=2.0 * _DAMPING * math.sqrt(inertia))
+        if compliance:
+            hide_from_controller(row, place, lambda load: -compliance * load)
 
 
 EFFECT = JointElasticity()

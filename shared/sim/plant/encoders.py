@@ -44,12 +44,12 @@ def misread(row: Row, label: str, scale: float, offset: float) -> None:
     row.logged_q = Signal(believed.at, true)
 
     def follow(target: Signal) -> Signal:
-        return _as_if_at(row, target, believed, Signal(believed.at, true))
+        return as_if_at(row, target, believed, Signal(believed.at, true))
 
     row.on_target(follow)
 
 
-def _as_if_at(row: Row, target: Signal, believed: Signal, true: Signal) -> Signal:
+def as_if_at(row: Row, target: Signal, believed: Signal, true: Signal) -> Signal:
     """Return the target that is as far from the true tool as the given one from the believed."""
     at: Float64 = row.plant.timestep * np.arange(
         int(np.ceil(row.duration / row.plant.timestep)) + 2, dtype=np.float64

@@ -11,6 +11,7 @@ import numpy as np
 
 from shared.sim.arm import Float64
 from shared.sim.model import silence
+from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.plant import TOOL, Plant
 from shared.sim.plant.row import FrictionLaw, JointsReport, Row, Step, TorqueLaw, TrackerReport
 from shared.sim.plant.signals import Signal, filtered, sampled, sampled_poses
@@ -112,6 +113,8 @@ class Rollouts:
         for row in rows:
             qpos[row.index, self._qpos] = row.initial_q
             qvel[row.index, self._dofs] = row.initial_qd
+        if any(row.rests for row in rows):
+            self._settle(rows)
         timestep = self.plant.timestep
         steps = int(np.ceil(max(row.duration for row in rows) / timestep)) + 1
         wants_tool = any(recorded.tracker_at is not None for _, recorded in work)
@@ -184,6 +187,17 @@ class Rollouts:
             self._batch.set_const(np.arange(len(rows)))
         self._needs_constants = bool(wanted & _CONSTANTS)
 
+    def _settle(self, rows: Sequence[Row]) -> None:
+        """Put added joints where their loads leave them; twice, as that changes the loads."""
+        qpos, bias = self._batch.bind("qpos"), self._batch.bind("qfrc_bias")
+        for _ in range(2):
+            self._batch.forward(np.arange(len(rows)), stage=mujoco.mjtStage.mjSTAGE_VEL)
+            for row in rows:
+                for name, rests in row.rests.items():
+                    joint = self.model.joint(name)
+                    load = float(bias[row.index, joint.dofadr[0]])
+                    qpos[row.index, joint.qposadr[0]] = rests(load)
+
     def _open(self, ids: np.ndarray, ctrl: Float64) -> tuple[Float64, Float64]:
         found = self._batch.rollout(
             ctrl.shape[1], control=ctrl, record=("qpos", "sensordata"), ids=ids
@@ -250,12 +264,22 @@ class Rollouts:
             return Reports(joints.q, None)
         at = recorded.tracker_at
         at = at if row.tracker_time is None else row.tracker_time(at)
-        report = TrackerReport(recorded.tracker_at, sampled_poses(times[:-1], tool, at))
+        report = TrackerReport(recorded.tracker_at, self._seen(row, times[:-1], tool, at))
         for change in row.tracker_reports:
             change(report)
         if is_bad:
             report.pose = np.full_like(report.pose, np.nan)
         return Reports(joints.q, report.pose)
+
+    def _seen(self, row: Row, times: Float64, tool: Float64, at: Float64) -> Float64:
+        """Return float64[K, 7]; of instants that were not replayed, from the joints' log."""
+        poses = sampled_poses(times, tool, at)
+        log = row.logged_q
+        is_left = ((at < times[0]) | (at > times[-1])) & (at >= log.at[0]) & (at <= log.at[-1])
+        if is_left.any():
+            q = sampled(log.at, log.values, at[is_left])
+            poses[is_left] = tool_poses(self.plant, self.model, q)
+        return poses
 
 
 def _controls(model: mujoco.MjModel, actuator: int) -> np.ndarray:

@@ -123,6 +123,9 @@ class Row:
     frictions: list[tuple[FrictionLaw, Float64]] = dataclasses.field(
         default_factory=list[tuple[FrictionLaw, Float64]]
     )
+    rests: dict[str, Callable[[float], float]] = dataclasses.field(
+        default_factory=dict[str, Callable[[float], float]]
+    )
     fields: dict[str, Float64] = dataclasses.field(default_factory=dict[str, Float64])
 
     def field(self, name: str) -> Float64:
@@ -167,9 +170,22 @@ class Row:
         joint = self.mj_joint(name)
         dof = int(self.model.jnt_dofadr[joint])
         stiffness = min(1.0 / max(compliance, 1e-12), STIFF)
+        self.rest(name, lambda load: -load / stiffness)
         self.field("jnt_stiffness")[joint] = stiffness
-        self.field("dof_damping")[dof] = ringing * stiffness**0.5
+        # The second part stills what the armature below would let ring, and is over in a step.
+        self.field("dof_damping")[dof] = (
+            ringing * stiffness**0.5 + 0.4 * stiffness * self.plant.timestep
+        )
         self.field("dof_armature")[dof] = armature_for(stiffness, self.plant.timestep)
+
+    def rest(self, name: str, rests: Callable[[float], float]) -> None:
+        """Let an added joint start where its load leaves it.
+
+        Args:
+            name: in the MJCF.
+            rests: turns the torque that it has to hold (N m, N) into its position (rad, m).
+        """
+        self.rests[name] = rests
 
     def torque(self, law: TorqueLaw, values: Float64) -> None:
         """Let a law act on this arm: float64[P] are its parameters."""

@@ -15,6 +15,8 @@ from shared.sim.plant.plant import Plant
 
 STIFF = 1e9
 """Of an added spring until an effect sets it, and the most there is (N m/rad)."""
+NO_FORCE = 1e-12
+"""A range of nothing is none to MuJoCo (N m, N)."""
 _JOINT = (
     "type", "pos", "axis", "ref", "range", "limited", "margin", "stiffness", "springref",
     "springdamper", "damping", "armature", "frictionloss", "actfrcrange", "actfrclimited",
@@ -48,16 +50,21 @@ class Builder:
         self.plant = plant
         self.spec = plant.make()
 
-    def series_joint(self, label: str) -> None:
+    def series_joint(self, label: str, part: str = "series") -> None:
         """Put a second joint between a logged joint's motor and its link.
 
         The first joint keeps name, motor, armature, friction and damping: it is what the encoder
-        sees. The second, ``NAME/series``, has the same axis and is as good as locked until an
-        effect calls :meth:`Row.spring`.
+        sees. The second, ``NAME/part``, has the same axis and is as good as locked until an
+        effect calls :meth:`Row.spring`. Drives, those of a pose included, act on the first alone.
         """
         motor = self.spec.joint(self.plant.mj_joint(label))
         made = motor.parent.add_joint(
-            name=series_name(self.plant, label), type=motor.type, axis=motor.axis, pos=motor.pos
+            name=series_name(self.plant, label, part),
+            type=motor.type,
+            axis=motor.axis,
+            pos=motor.pos,
+            actfrclimited=mujoco.mjtLimited.mjLIMITED_TRUE,
+            actfrcrange=(-NO_FORCE, NO_FORCE),
         )
         self._lock(made)
 
@@ -115,9 +122,9 @@ def armature_for(stiffness: float, timestep: float) -> float:
     return 0.5 * stiffness * timestep**2
 
 
-def series_name(plant: Plant, label: str) -> str:
+def series_name(plant: Plant, label: str, part: str = "series") -> str:
     """Return the MJCF's name of the joint that :meth:`Builder.series_joint` adds."""
-    return f"{plant.mj_joint(label)}/series"
+    return f"{plant.mj_joint(label)}/{part}"
 
 
 def compiled(plant: Plant, structure: Structure) -> mujoco.MjModel:
