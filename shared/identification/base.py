@@ -1,0 +1,184 @@
+"""The parameters that are fitted before any cause is looked for, and what is known of them.
+
+The paper fits damping, armature, friction loss and the controller's gains. Here every joint and
+every axis has its own, and the links' inertia may move too, held by what is known of it: a base
+that is too coarse blames effects for what is its own fault.
+
+Coordinates are normalised: 0 is nominal, and 1 is a factor e or the scale of a sum.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from shared.identification.dataset.types import Float64
+from shared.identification.subject import Subject
+from shared.sim.plant.row import Row
+
+INERTIA_PRIOR = 0.1
+"""Standard deviation of what is known of a link's mass and inertia (1)."""
+_LOOSE = 1.5
+"""Of damping, armature and gains: a factor of 4.5 either way is unlikely."""
+
+
+@dataclass(frozen=True)
+class BaseParameter:
+    """One number of the base model."""
+
+    name: str
+    """``damping shoulder_pan``."""
+    unit: str
+    nominal: float
+    is_factor: bool
+    """Whether the value is nominal * exp(x), else nominal + scale * x."""
+    scale: float
+    low: float
+    """Of x."""
+    high: float
+    prior: float
+    """Standard deviation of what is known of x beforehand."""
+    change: Callable[[Row, float], None]
+    """Puts a value (not x) into one arm."""
+
+    def value(self, x: float) -> float:
+        """Return the value at a coordinate."""
+        return self.nominal * float(np.exp(x)) if self.is_factor else self.nominal + self.scale * x
+
+
+def base_parameters(subject: Subject) -> tuple[BaseParameter, ...]:
+    """Return the parameters of a subject; what its model has not (no friction) is none."""
+    found: list[BaseParameter] = []
+    model = subject.nominal.model
+    for label in subject.joints:
+        dof = int(model.joint(subject.plant.mj_joint(label)).dofadr[0])
+        for field, word, unit in (
+            ("dof_damping", "damping", "N m s/rad"),
+            ("dof_armature", "armature", "kg m^2"),
+        ):
+            nominal = float(getattr(model, field)[dof])
+            if nominal > 0.0:
+                found.append(_factor(f"{word} {label}", unit, nominal, _LOOSE, _setter(field, dof)))
+        if (friction := _friction_scale(subject, dof)) > 0.0:
+            nominal = float(model.dof_frictionloss[dof])
+            found.append(
+                BaseParameter(
+                    name=f"friction_loss {label}",
+                    unit="N m",
+                    nominal=nominal,
+                    is_factor=False,
+                    scale=friction,
+                    low=-nominal / friction,
+                    high=5.0,
+                    prior=_LOOSE,
+                    change=_setter("dof_frictionloss", dof),
+                )
+            )
+    found += _gains(subject)
+    found += _inertias(subject)
+    return tuple(found)
+
+
+def enter_base(parameters: tuple[BaseParameter, ...], x: Float64, row: Row) -> None:
+    """Put the base model at coordinates into one arm: float64[n]."""
+    for parameter, coordinate in zip(parameters, x, strict=True):
+        if coordinate != 0.0:
+            parameter.change(row, parameter.value(float(coordinate)))
+
+
+def _factor(
+    name: str, unit: str, nominal: float, prior: float, change: Callable[[Row, float], None]
+) -> BaseParameter:
+    return BaseParameter(name, unit, nominal, True, 1.0, -4.0, 4.0, prior, change)
+
+
+def _setter(field: str, index: int) -> Callable[[Row, float], None]:
+    def change(row: Row, value: float) -> None:
+        row.field(field)[index] = value
+
+    return change
+
+
+def _friction_scale(subject: Subject, dof: int) -> float:
+    """Return how much friction is a unit; 0 where the model has none and it is to be found.
+
+    A PR2's joints are known to rub, the model only does not know how much; of another arm a
+    friction that its model lacks is a cause to be named.
+    """
+    model = subject.nominal.model
+    if model.dof_frictionloss[dof] > 0.0:
+        return float(model.dof_frictionloss[dof])
+    if subject.control != "pose":
+        return 0.0
+    joint = int(model.dof_jntid[dof])
+    return 0.05 * float(model.jnt_actfrcrange[joint, 1])
+
+
+def _gains(subject: Subject) -> list[BaseParameter]:
+    """Return the gains of servos: kp and kv are in gain and bias of the same actuator."""
+    model = subject.nominal.model
+    found: list[BaseParameter] = []
+    if subject.control == "torque":
+        return found
+    for index, name in enumerate(subject.plant.actuators):
+        actuator = int(model.actuator(name).id)
+        label = name.rsplit("/", 1)[-1] if subject.control == "pose" else subject.joints[index]
+        kp, kv = (
+            float(model.actuator_gainprm[actuator, 0]),
+            -float(model.actuator_biasprm[actuator, 2]),
+        )
+        for word, nominal, change in (
+            ("kp", kp, _kp_setter(actuator)),
+            ("kv", kv, _kv_setter(actuator)),
+        ):
+            if nominal > 0.0:
+                found.append(_factor(f"{word} {label}", "", nominal, _LOOSE, change))
+    return found
+
+
+def _kp_setter(actuator: int) -> Callable[[Row, float], None]:
+    def change(row: Row, value: float) -> None:
+        row.field("actuator_gainprm")[actuator, 0] = value
+        row.field("actuator_biasprm")[actuator, 1] = -value
+
+    return change
+
+
+def _kv_setter(actuator: int) -> Callable[[Row, float], None]:
+    def change(row: Row, value: float) -> None:
+        row.field("actuator_biasprm")[actuator, 2] = -value
+
+    return change
+
+
+def _inertias(subject: Subject) -> list[BaseParameter]:
+    """Return a factor of mass and inertia for each link that moves."""
+    model = subject.nominal.model
+    found: list[BaseParameter] = []
+    for label in subject.joints:
+        joint = int(model.joint(subject.plant.mj_joint(label)).id)
+        body = int(model.jnt_bodyid[joint])
+        if model.body_mass[body] > 0.0:
+            found.append(
+                BaseParameter(
+                    name=f"mass {label}",
+                    unit="kg",
+                    nominal=float(model.body_mass[body]),
+                    is_factor=True,
+                    scale=1.0,
+                    low=-1.0,
+                    high=1.0,
+                    prior=INERTIA_PRIOR,
+                    change=_mass_setter(body),
+                )
+            )
+    return found
+
+
+def _mass_setter(body: int) -> Callable[[Row, float], None]:
+    def change(row: Row, value: float) -> None:
+        mass = row.field("body_mass")
+        row.field("body_inertia")[body] *= value / mass[body]
+        mass[body] = value
+
+    return change

@@ -1,0 +1,120 @@
+"""The noise floor: how far two recordings of the same commands differ.
+
+Half the mean square of the difference of repeats, of the block means that residuals are made of.
+It has everything that a model cannot know: sensors, and whatever pushes the arm at random.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shared.identification.dataset.types import Dataset, Float64, Trajectory
+from shared.identification.smoothing import smooth
+from shared.sim.plant.signals import pose_error, sampled, sampled_poses
+
+_BAND = 25
+"""Without repeats: readings that a local cubic is taken through."""
+_STRETCH = 25
+"""Blocks whose power is looked at together."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations of block means."""
+
+    joints: Float64
+    """float64[J] (rad, m)."""
+    tracker: Float64 | None
+    """float64[6] (m, rad)."""
+    correlation: Float64
+    """float64[C], of neighbouring blocks, joints first."""
+    is_measured: bool
+    """Whether repeats were there; else only what is faster than the arm was seen."""
+
+
+def noise_of(dataset: Dataset, block: float) -> Noise:
+    """Return the noise floor of a data set.
+
+    Args:
+        dataset: the recordings; those with ``repeats`` are compared with what they repeat.
+        block: what residuals are averaged over (s).
+    """
+    by_name = {each.name: each for each in dataset.trajectories}
+    pairs = [(by_name[each.repeats], each) for each in dataset.trajectories if each.repeats]
+    if pairs:
+        joints = [_blocks(first.joints_at, _against(first, second), block)
+                  for first, second in pairs]  # fmt: skip
+        tracker = [
+            _blocks(first.tracker_at, _tracker_against(first, second), block)
+            for first, second in pairs
+            if first.tracker_at is not None
+        ]
+        scale = np.sqrt(0.5)
+    else:
+        joints = [_blocks(each.joints_at, _fast(each.joints_at, each.q), block)
+                  for each in dataset.trajectories]  # fmt: skip
+        tracker = [
+            _blocks(each.tracker_at, _fast(each.tracker_at, each.tracker), block)
+            for each in dataset.trajectories
+            if each.tracker_at is not None and each.tracker is not None
+        ]
+        scale = 1.0
+    of_joints, joint_correlation = _floor(joints, scale)
+    of_tracker, correlation = None, joint_correlation
+    if dataset.has_tracker and tracker:
+        of_tracker, tracker_correlation = _floor(tracker, scale)
+        if not pairs:  # poses have seven numbers, their errors six
+            of_tracker = np.r_[of_tracker[:3], np.repeat(2.0 * of_tracker[4:].mean(), 3)]
+            tracker_correlation = tracker_correlation[:6]
+        correlation = np.r_[joint_correlation, tracker_correlation]
+    return Noise(of_joints, of_tracker, correlation, is_measured=bool(pairs))
+
+
+def _against(first: Trajectory, second: Trajectory) -> Float64:
+    at = first.joints_at
+    inside = at <= second.joints_at[-1]
+    out = first.q - sampled(second.joints_at, second.q, at)
+    return out[inside] if inside.sum() > 10 else out
+
+
+def _tracker_against(first: Trajectory, second: Trajectory) -> Float64:
+    assert first.tracker_at is not None
+    assert first.tracker is not None
+    assert second.tracker_at is not None
+    assert second.tracker is not None
+    other = sampled_poses(second.tracker_at, second.tracker, first.tracker_at)
+    return pose_error(first.tracker, other)
+
+
+def _fast(at: Float64, values: Float64) -> Float64:
+    """Return what a local quadratic leaves: faster than the arm moves."""
+    width = min(_BAND, (len(at) - 1) // 2 * 2 - 1)
+    return values - smooth(values, max(width, 5))
+
+
+def _blocks(at: Float64 | None, values: Float64, block: float) -> Float64:
+    assert at is not None
+    number = np.floor((at[: len(values)] - at[0]) / block + 1e-6).astype(np.int64)
+    starts = np.flatnonzero(np.r_[True, np.diff(number) > 0])
+    counts = np.diff(np.r_[starts, len(values)])[:, None]
+    return np.add.reduceat(values, starts, axis=0) / counts
+
+
+def _floor(parts: list[Float64], scale: float) -> tuple[Float64, Float64]:
+    """Return standard deviations and neighbours' correlations, by column.
+
+    A stretch in which repeats part company (contact, a singular posture) would hide everything, so
+    the floor is taken from the stretches of 0.5 s without their noisiest fifth.
+    """
+    stretches = [
+        part[begin : begin + _STRETCH]
+        for part in parts
+        for begin in range(0, max(len(part) - _STRETCH + 1, 1), _STRETCH)
+    ]
+    power = np.array([np.mean(stretch**2, axis=0) for stretch in stretches])
+    kept = np.sort(power, axis=0)[: max(int(np.ceil(0.8 * len(power))), 1)]
+    variance = kept.mean(axis=0)
+    whole = np.concatenate(parts)
+    moved = np.concatenate([part[1:] * part[:-1] for part in parts]).mean(axis=0)
+    total = np.maximum(np.mean(whole**2, axis=0), 1e-30)
+    return scale * np.sqrt(np.maximum(variance, 1e-16)), np.clip(moved / total, 0.0, 0.99)
