@@ -30,7 +30,7 @@ class JointSpring:
             Quantity("stiffness", f"{joint.torque}/{joint.angle}", 0.0, 4.0 * full, 0.2 * full),
             Quantity(
                 "rest", joint.angle, joint.lowest - joint.travel, highest + joint.travel,
-                probe=joint.lowest + 0.5 * joint.travel,
+                probe=max(abs(joint.lowest + 0.5 * joint.travel), 0.25 * joint.travel),
             ),
         )  # fmt: skip
 

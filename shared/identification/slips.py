@@ -1,0 +1,63 @@
+"""When a tracker may have slipped, from the tracker and the encoders alone."""
+
+import numpy as np
+
+from shared.identification.dataset.types import Float64, Trajectory
+from shared.identification.subject import Subject
+from shared.sim.plant.kinematics import tool_poses
+from shared.sim.plant.poses import conjugate, rotated
+from shared.sim.plant.signals import sampled
+
+_WINDOW = 0.25
+"""Before and after an instant (s)."""
+_FEWEST = 5
+"""Readings of a window."""
+_CLEAR = 4.0
+"""A step is worth a look from so many times the median one."""
+
+
+def slip_of(subject: Subject, recording: Trajectory) -> float | None:
+    """Return the likeliest instant, on the tracker's clock (s); None if no step stands out."""
+    if recording.tracker_at is None or recording.tracker is None:
+        return None
+    at = recording.tracker_at
+    q = sampled(recording.joints_at, recording.q, at)
+    expected = tool_poses(subject.plant, subject.nominal.model, q)
+    off = rotated(conjugate(expected[:, 3:]), recording.tracker[:, :3] - expected[:, :3])
+    count = max(_FEWEST, round(_WINDOW / float(np.median(np.diff(at)))))
+    if len(at) < 4 * count:
+        return None
+    sizes = np.linalg.norm(_steps(off, count), axis=1)
+    if float(sizes.max()) <= _CLEAR * float(np.median(sizes)):
+        return None
+    edge = _sharpened(off, int(np.argmax(sizes)) + count, count)
+    return 0.5 * float(at[edge - 1] + at[edge])
+
+
+def _steps(values: Float64, count: int) -> Float64:
+    """Return float64[K - 2 count + 1, D]: steps between straight lines before and after.
+
+    Row k is about the edge between the readings ``k + count - 1`` and ``k + count``.
+    """
+    x = np.arange(count) - 0.5 * (count - 1)
+    ahead = 1.0 / count + x * 0.5 * count / np.sum(x**2)  # extrapolates half a reading
+    columns = [
+        np.correlate(column[count:], ahead[::-1], "valid")
+        - np.correlate(column[:-count], ahead, "valid")
+        for column in values.T
+    ]
+    return np.stack(columns, axis=1)
+
+
+def _sharpened(values: Float64, edge: int, count: int) -> int:
+    """Return the edge that a line with a step fits best near a first guess."""
+    begin = max(edge - count, 0)
+    part = values[begin : edge + count]
+    x = np.linspace(-1.0, 1.0, len(part))
+    misfits: list[float] = []
+    tries = range(2, len(part) - 1)
+    for first in tries:
+        basis = np.stack([np.ones_like(x), x, (np.arange(len(part)) >= first) * 1.0], axis=1)
+        found, *_ = np.linalg.lstsq(basis, part, rcond=None)
+        misfits.append(float(np.sum((part - basis @ found) ** 2)))
+    return begin + tries[int(np.argmin(misfits))]
