@@ -39,22 +39,15 @@ def noise_of(dataset: Dataset, block: float) -> Noise:
         dataset: the recordings; those with ``repeats`` are compared with what they repeat.
         block: what residuals are averaged over (s).
     """
-    by_name = {each.name: each for each in dataset.trajectories}
-    pairs = [(by_name[each.repeats], each) for each in dataset.trajectories if each.repeats]
+    joints, tracker = repeat_differences(dataset, block)
+    pairs = len(joints)
     if pairs:
-        joints = [_blocks(first.joints_at, _against(first, second), block)
-                  for first, second in pairs]  # fmt: skip
-        tracker = [
-            _blocks(first.tracker_at, _tracker_against(first, second), block)
-            for first, second in pairs
-            if first.tracker_at is not None
-        ]
         scale = np.sqrt(0.5)
     else:
-        joints = [_blocks(each.joints_at, _fast(each.joints_at, each.q), block)
+        joints = [block_means(each.joints_at, _fast(each.joints_at, each.q), block)
                   for each in dataset.trajectories]  # fmt: skip
         tracker = [
-            _blocks(each.tracker_at, _fast(each.tracker_at, each.tracker), block)
+            block_means(each.tracker_at, _fast(each.tracker_at, each.tracker), block)
             for each in dataset.trajectories
             if each.tracker_at is not None and each.tracker is not None
         ]
@@ -68,6 +61,24 @@ def noise_of(dataset: Dataset, block: float) -> Noise:
             tracker_correlation = tracker_correlation[:6]
         correlation = np.r_[joint_correlation, tracker_correlation]
     return Noise(of_joints, of_tracker, correlation, is_measured=bool(pairs))
+
+
+def repeat_differences(dataset: Dataset, block: float) -> tuple[list[Float64], list[Float64]]:
+    """Return what repeats differ by, as block means: float64[B, J] and float64[B, 6] each.
+
+    Both are empty without repeats. The variance of a difference is twice that of the noise.
+    """
+    by_name = {each.name: each for each in dataset.trajectories}
+    pairs = [(by_name[each.repeats], each) for each in dataset.trajectories if each.repeats]
+    joints = [
+        block_means(first.joints_at, _against(first, second), block) for first, second in pairs
+    ]
+    tracker = [
+        block_means(first.tracker_at, _tracker_against(first, second), block)
+        for first, second in pairs
+        if first.tracker_at is not None and second.tracker_at is not None
+    ]
+    return joints, tracker
 
 
 def _against(first: Trajectory, second: Trajectory) -> Float64:
@@ -92,8 +103,14 @@ def _fast(at: Float64, values: Float64) -> Float64:
     return values - smooth(values, max(width, 5))
 
 
-def _blocks(at: Float64 | None, values: Float64, block: float) -> Float64:
-    assert at is not None
+def block_means(at: Float64, values: Float64, block: float) -> Float64:
+    """Return float64[B, D]: means over blocks that follow each other from the first instant.
+
+    Args:
+        at: float64[T] (s), rising.
+        values: float64[T', D] of the first T' instants.
+        block: length (s); one without a reading is left out.
+    """
     number = np.floor((at[: len(values)] - at[0]) / block + 1e-6).astype(np.int64)
     starts = np.flatnonzero(np.r_[True, np.diff(number) > 0])
     counts = np.diff(np.r_[starts, len(values)])[:, None]

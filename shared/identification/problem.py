@@ -115,7 +115,7 @@ class Problem:
         """
         return [
             [
-                self._whitened(report, segment)
+                self.whitened(report, segment)
                 for report, segment in zip(reports, segments, strict=True)
             ]
             for reports in self.reports(variants, segments)
@@ -138,10 +138,8 @@ class Problem:
             return joints, None
         return joints, pose_error(logged.tracker, reports.tracker)
 
-    def _entry(self, variant: Variant) -> "_Enter":
-        return _Enter(self.parameters, variant)
-
-    def _whitened(self, reports: Reports, segment: int) -> Float64:
+    def whitened(self, reports: Reports, segment: int) -> Float64:
+        """Return the residuals of one segment in noise floors, as :meth:`residuals` does."""
         joints, tracker = self.raw(reports, segment)
         of_joints, of_tracker = self._bins[segment]
         out = of_joints.mean(joints) / self.noise.joints
@@ -150,6 +148,9 @@ class Problem:
             rows = min(len(out), len(more))
             out = np.concatenate([out[:rows], more[:rows]], axis=1)
         return np.nan_to_num(out, nan=DIVERGED, posinf=DIVERGED, neginf=-DIVERGED)
+
+    def _entry(self, variant: Variant) -> "_Enter":
+        return _Enter(self.parameters, variant)
 
 
 @dataclass(frozen=True)
