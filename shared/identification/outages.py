@@ -9,7 +9,7 @@ from shared.sim.plant.signals import Signal
 
 
 def lost_at(command_at: Float64, joints_at: Float64) -> NDArray[np.bool_]:
-    """Return bool[C]: whether a command was given in a gap of the joints' log.
+    """Return bool[C]: whether a command was given in a gap of the joints' log, its ends excluded.
 
     Args:
         command_at: float64[C] (s).
@@ -19,8 +19,9 @@ def lost_at(command_at: Float64, joints_at: Float64) -> NDArray[np.bool_]:
     if not len(steps):
         return np.zeros(len(command_at), np.bool_)
     is_gap = steps > GAP_PERIODS * float(np.median(steps))
-    before = np.searchsorted(joints_at, command_at, side="right") - 1
-    within = (before >= 0) & (before < len(steps))
+    before = np.searchsorted(joints_at, command_at, side="left") - 1
+    is_between = before + 1 == np.searchsorted(joints_at, command_at, side="right")
+    within = is_between & (before >= 0) & (before < len(steps))
     return within & is_gap[np.clip(before, 0, len(steps) - 1)]
 
 

@@ -1,0 +1,97 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shared.identification.catalogue.tracker_slip import EFFECT
+from shared.identification.dataset.types import Float64, Trajectory
+from shared.identification.slips import slip_of
+from shared.identification.subject import Subject
+from shared.sim.plant.kinematics import tool_poses
+from shared.sim.plant.poses import conjugate, rotated
+from shared.sim.plant.rollouts import Reports
+from tests.arms import make_plant, make_subject, recorded, replay
+
+WAY = [0.004, -0.003, 0.0]
+
+
+@pytest.fixture(scope="module")
+def subject(tmp_path_factory: pytest.TempPathFactory) -> Subject:
+    return make_subject(make_plant(tmp_path_factory.mktemp("arm")))
+
+
+def _waving(at: Float64) -> Float64:
+    return np.stack([0.8 * np.sin(2 * at), 0.3 * np.sin(3 * at), 0.5 * np.sin(2.5 * at)], axis=1)
+
+
+def _seen(subject: Subject, slip_at: float, noise: float, lag: float = 0.0) -> Trajectory:
+    """Return a recording of 6 s whose tracker moves by 5 mm in the hand at an instant."""
+    rng = np.random.default_rng(5)
+    at: Float64 = np.arange(0.0, 6.0, 0.01)
+    tracker = tool_poses(subject.plant, subject.nominal.model, _waving(at - lag))
+    late = at >= slip_at
+    tracker[late, :3] += rotated(tracker[late, 3:], np.array(WAY))
+    tracker[:, :3] += noise * rng.standard_normal((len(at), 3))
+    q = _waving(at)
+    return Trajectory(
+        "slow", "train", "", q[0], 0.0 * q[0], at, q, at, q, tracker_at=at, tracker=tracker
+    )
+
+
+def _tracker(reports: Reports) -> Float64:
+    assert reports.tracker is not None
+    return reports.tracker
+
+
+@pytest.mark.parametrize("slip_at", [1.5, 4.2])
+def test_a_slip_is_timed_without_simulating(subject: Subject, slip_at: float):
+    assert slip_of(subject, _seen(subject, slip_at, 0.5e-3)) == pytest.approx(slip_at, abs=0.05)
+
+
+def test_a_slip_is_timed_beside_a_lag_of_the_tracker(subject: Subject):
+    found = slip_of(subject, _seen(subject, 3.3, 0.2e-3, lag=0.015))
+    assert found == pytest.approx(3.3, abs=0.05)
+
+
+def test_noise_alone_is_no_slip(subject: Subject):
+    assert slip_of(subject, _seen(subject, 100.0, 0.5e-3)) is None
+
+
+def test_a_slip_is_looked_for_once_in_each_recording_to_fit_to(subject: Subject):
+    slipped, smooth = _seen(subject, 2.0, 0.3e-3), _seen(subject, 100.0, 0.3e-3)
+    later = replace(_seen(subject, 4.0, 0.3e-3), name="fast")
+    held_out = replace(slipped, name="other", split="test")
+    recordings = (slipped, held_out, later)
+    assert EFFECT.places(replace(subject, recordings=recordings)) == (
+        "slow at 1.995 s",
+        "fast at 3.995 s",
+    )
+    assert EFFECT.places(replace(subject, recordings=(smooth,))) == ()
+    assert EFFECT.places(replace(subject, recordings=recordings, has_tracker=False)) == ()
+
+
+def test_the_tracker_is_off_from_the_slip_on(subject: Subject):
+    motion = recorded(_waving, seconds=2.0)
+    plain = _tracker(replay(subject, motion))
+    found = _tracker(replay(subject, motion, EFFECT, "slow at 0.995 s", WAY))
+    np.testing.assert_array_equal(found[:100], plain[:100])
+    in_hand = rotated(conjugate(plain[100:, 3:]), found[100:, :3] - plain[100:, :3])
+    np.testing.assert_allclose(in_hand, np.tile(WAY, (100, 1)), atol=1e-12)
+
+
+def test_it_stays_off_in_what_is_recorded_later_and_was_right_before(subject: Subject):
+    motion = recorded(_waving, trajectory="third")
+    later = replace(motion, earlier=("first", "second"))
+    plain = _tracker(replay(subject, motion))
+    moved = _tracker(replay(subject, later, EFFECT, "second at 3.000 s", WAY))
+    assert np.linalg.norm(moved[:, :3] - plain[:, :3], axis=1) == pytest.approx(0.005)
+    before = _tracker(replay(subject, later, EFFECT, "fourth at 3.000 s", WAY))
+    np.testing.assert_array_equal(before, plain)
+
+
+def test_in_a_part_of_a_recording_the_instant_is_the_recordings(subject: Subject):
+    part = replace(recorded(_waving), begin=10.0)
+    plain = _tracker(replay(subject, part))
+    found = _tracker(replay(subject, part, EFFECT, "slow at 10.495 s", WAY))
+    np.testing.assert_array_equal(found[:50], plain[:50])
+    assert np.linalg.norm(found[50:, :3] - plain[50:, :3], axis=1) == pytest.approx(0.005)
