@@ -1,4 +1,4 @@
-"""How a residual looks: over speed, direction, position, effort, time; lag; spectrum.
+"""How a residual looks: over speed, direction, position, effort, time; lag; spectrum; which side.
 
 Pure description of arrays: nothing is decided here. Residual is always measured minus predicted.
 """
@@ -9,6 +9,7 @@ import numpy as np
 
 from shared.identification.dataset.types import Float64
 from shared.identification.evidence import Diagnostics, Profile, Replay
+from shared.identification.sides import Floors, sides_of
 
 BINS = 16
 LEAST_IN_BIN = 8
@@ -19,6 +20,9 @@ BANDS_HZ = (0.1, 0.3, 0.6, 1.0, 2.0, 3.0, 5.0, 8.0, 13.0, 20.0, 32.0, 50.0)
 """Edges of the spectrum's bands."""
 LONGEST_LAG = 0.2
 """Beyond which no lag is looked for (s)."""
+_COARSE = 0.02
+"""Step of the shifts that are tried (s)."""
+_STEPS = 3
 LEAST_LAGGED = 0.02
 """A joint whose speed has a smaller standard deviation (rad/s, m/s) shows no lag."""
 
@@ -28,6 +32,7 @@ def diagnose(
     joints: Sequence[str],
     units: Sequence[str],
     starts: dict[str, float] | None = None,
+    floors: Floors | None = None,
 ) -> Diagnostics:
     """Return how the residual of the base fit looks over all trajectories together.
 
@@ -36,6 +41,7 @@ def diagnose(
         joints: names, in the order of every array.
         units: of each joint, ``rad`` or ``m``.
         starts: seconds that the arm had already been working when each trajectory began, by name.
+        floors: the noise; without it nothing is said about sides.
     """
     starts = starts or {}
     residual = np.concatenate([each.q - each.predicted["base_fit"] for each in replays])
@@ -65,6 +71,7 @@ def diagnose(
         lag=_lags(replays, joints),
         frequency=frequency,
         spectrum=spectrum,
+        sides=None if floors is None else sides_of(replays, floors),
     )
 
 
@@ -127,27 +134,53 @@ def _lags(replays: Sequence[Replay], joints: Sequence[str]) -> dict[str, float]:
 
 
 def _lag(pairs: Sequence[tuple[Float64, Float64, Float64]]) -> float | None:
-    """Return by how long measured signals are behind predicted ones, by least squares (s).
+    """Return by how long measured signals are behind predicted ones (s).
 
-    The residual of a signal that is late by a short time is minus that time its rate:
+    First the shift of least squares on a coarse grid, then Gauss-Newton steps from there: what a
+    signal that is late by a short time more leaves is minus that time its rate,
     r = -lag dq/dt, with a constant offset a signal left free.
     """
-    upper = lower = 0.0
-    is_lively = False
-    for at, measured, predicted in pairs:
-        residual = measured - predicted
-        is_known = np.isfinite(residual)
-        if is_known.sum() < 10:
-            continue
-        rate = np.gradient(predicted[is_known], at[is_known])
-        is_lively = is_lively or float(np.std(rate)) > LEAST_LAGGED
-        rate = rate - rate.mean()
-        left = residual[is_known] - residual[is_known].mean()
-        upper += float(-(left * rate).sum())
-        lower += float((rate**2).sum())
-    if not is_lively or lower == 0.0:
+    known = [
+        (at[is_known], measured[is_known], predicted[is_known])
+        for at, measured, predicted in pairs
+        if (is_known := np.isfinite(measured - predicted)).sum() >= 10
+    ]
+    if not any(float(np.std(np.gradient(each[2], each[0]))) > LEAST_LAGGED for each in known):
         return None
-    return float(np.clip(upper / lower, -LONGEST_LAG, LONGEST_LAG))
+    coarse: Float64 = np.arange(-LONGEST_LAG, LONGEST_LAG + 1e-9, _COARSE, dtype=np.float64)
+    misfits = [
+        sum(
+            float(np.sum(_against(shift, each)[0] ** 2))
+            for each in known
+            if each[0][-1] - each[0][0] > 3.0 * LONGEST_LAG
+        )
+        for shift in coarse
+    ]
+    lag = float(coarse[int(np.argmin(misfits))]) if any(misfits) else 0.0
+    for _ in range(_STEPS):
+        upper = lower = 0.0
+        for each in known:
+            left, rate = _against(lag, each)
+            upper -= float((left * rate).sum())
+            lower += float((rate**2).sum())
+        if lower == 0.0:
+            return None
+        lag = float(np.clip(lag + upper / lower, -LONGEST_LAG, LONGEST_LAG))
+    return lag
+
+
+def _against(shift: float, pair: tuple[Float64, Float64, Float64]) -> tuple[Float64, Float64]:
+    """Return what a shifted prediction leaves, and its rate, both without their means.
+
+    Only of instants that every shift has, so that all are compared on the same ones.
+    """
+    at, measured, predicted = pair
+    margin = min(LONGEST_LAG, 0.1 * float(at[-1] - at[0]))
+    inside = (at >= at[0] + margin) & (at <= at[-1] - margin)
+    shifted = np.interp(at[inside] - shift, at, predicted)
+    left = measured[inside] - shifted
+    rate = np.gradient(shifted, at[inside])
+    return left - left.mean(), rate - rate.mean()
 
 
 def _spectrum(replays: Sequence[Replay]) -> tuple[Float64, Float64]:

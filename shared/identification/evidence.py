@@ -32,13 +32,16 @@ class Replay:
     loss: dict[Stage, float]
     """Root-mean-square residual in units of the noise floor, as in the verdict."""
     effort: Float64 | None = None
-    """float64[T, J], logged or commanded torque (N m, N), where there is one."""
+    """float64[T, J], torque as it was logged or commanded, else as the model says that the motion
+    takes it (N m, N)."""
     tracker_at: Float64 | None = None
     """float64[K] (s)."""
     tracker: Float64 | None = None
     """float64[K, 7], measured poses in the base frame (m; w x y z)."""
     tracked: dict[Stage, Float64] = field(default_factory=dict[Stage, Float64])
     """float64[K, 7] each, as the model predicts that the tracker logs them."""
+    by_encoders: Float64 | None = None
+    """float64[K, 7], where the tool is by the logged joints and the nominal kinematics."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,25 @@ class Profile:
 
 
 @dataclass(frozen=True)
+class Sides:
+    """Whether what is off is off before the encoders already, or only behind them.
+
+    Before them are commands, controller, drives, friction and loads; behind them are links that
+    give, encoders that are wrong, frames, the tracker and its clock. All root mean square.
+    """
+
+    joints: float
+    """Residual of the joint that is furthest off, in units of its noise floor."""
+    tracker: tuple[float, float]
+    """Tracker less simulated tracker (m, rad)."""
+    behind: tuple[float, float]
+    """Tracker less forward kinematics of the logged joints (m, rad)."""
+    behind_noise: float
+    """The larger part of ``behind``, in units of the tracker's noise floor."""
+    where: Literal["before the encoders", "behind the encoders", "both", "neither"]
+
+
+@dataclass(frozen=True)
 class Diagnostics:
     """How the residual of the base fit looks; nothing is decided by it."""
 
@@ -72,6 +94,8 @@ class Diagnostics:
     """float64[F], centres of the bands (Hz)."""
     spectrum: Float64
     """float64[J, F], root-mean-square residual in each band (rad, m)."""
+    sides: Sides | None = None
+    """None without a tracker or a noise floor."""
 
 
 @dataclass(frozen=True)
@@ -85,16 +109,13 @@ class Evidence:
     noise: Float64
     """float64[J], noise floor of each joint, root mean square (rad, m)."""
     tracker_noise: tuple[float, float] | None
-    """The same of the tracker: position (m), orientation (rad)."""
+    """The same of the tracker: position (m), orientation (rad), the three axes together."""
     noise_from_repeats: bool
     """Whether the noise floor is from recordings that repeat each other, else from the residual."""
     replays: tuple[Replay, ...]
-    """All trajectories, in the order of the data set."""
+    """All trajectories but repeats, in the order of the data set."""
     diagnostics: Diagnostics
     """See :func:`shared.identification.diagnose.diagnose`."""
-    fields: dict[str, Float64] = field(default_factory=dict[str, Float64])
-    """Of ``mjModel``, all that base fit and causes change, in full and as the extended model has
-    it: ``Row.fields`` after the entry was let in, the causes' structures compiled in."""
 
     @property
     def held_out(self) -> tuple[Replay, ...]:

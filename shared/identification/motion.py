@@ -23,6 +23,8 @@ class Motion:
     """float64[T, J] (rad/s, m/s)."""
     qdd: Float64
     """float64[T, J] (rad/s^2, m/s^2)."""
+    at: Float64
+    """float64[T] (s)."""
 
 
 def motion_of(trajectory: Trajectory) -> Motion:
@@ -36,9 +38,10 @@ def motion_of(trajectory: Trajectory) -> Motion:
     half = max(round(_SMOOTH / period / 2.0), 2)
     if len(even) <= 2 * half:
         still = np.zeros_like(trajectory.q)
-        return Motion(trajectory.q, still, still)
+        return Motion(trajectory.q, still, still, at)
     near = period * np.arange(-half, half + 1)
     fit = np.linalg.pinv(np.vander(near, 4, increasing=True))
     q = sampled(at, trajectory.q, even)
     windows = np.lib.stride_tricks.sliding_window_view(q, 2 * half + 1, axis=0)
-    return Motion(windows @ fit[0], windows @ fit[1], 2.0 * windows @ fit[2])
+    inner = even[half : len(even) - half]
+    return Motion(windows @ fit[0], windows @ fit[1], 2.0 * windows @ fit[2], inner)

@@ -29,6 +29,11 @@ def test_a_late_arm_shows_its_lag() -> None:
     }
 
 
+def test_a_lag_that_is_long_for_the_motion_is_no_shorter_in_the_numbers() -> None:
+    found = diagnose([replay(np.zeros((len(AT), 2)), late=0.1537)], JOINTS, UNITS)
+    assert found.lag["shoulder"] == pytest.approx(0.1537, abs=2e-4)
+
+
 def test_a_residual_that_follows_the_direction_shows_as_two_means() -> None:
     velocity = np.pi * np.cos(np.pi * AT)
     residual = np.stack([-0.01 * np.sign(velocity), np.zeros(len(AT))], axis=1)
