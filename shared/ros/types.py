@@ -1,4 +1,4 @@
-"""Messages: made, written, read and identified. The only door to ``rosbags``.
+"""Messages: made, written, read and identified. With ``bags`` the only door to ``rosbags``.
 
 A message is an instance of a plain class with the fields of its ROS definition; arrays of numbers
 are NumPy arrays, other arrays lists. Types are named as in ROS 1: ``geometry_msgs/PoseStamped``;
