@@ -60,6 +60,7 @@ EXTRAS = {
     "websockets": "play",
     "sounddevice": "play",
     "rosbags": "robot",
+    "apsw": "robot",
     "openvr": "robot",
     "bleak": "robot",
 }
