@@ -24,6 +24,9 @@ class Quantity:
     """A size that a good recording shows and that is not extreme: where the search starts."""
     is_smooth: bool = True
     """Whether small changes of it change the motion a little; else it is searched on a grid."""
+    grid: tuple[float, ...] = ()
+    """Of a number that says how, not how much, and means nothing while the others are 0: where to
+    look first. Its probe is only what it is counted in."""
 
 
 class Effect(Protocol):

@@ -5,13 +5,14 @@ out, so that a latency that damping imitates does not count twice, and candidate
 imitates altogether do not count at all.
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from shared.identification.dataset.types import Float64
-from shared.identification.effect import Candidate, Effect
+from shared.identification.effect import Candidate, Effect, Quantity
 from shared.identification.fit import Fit, least_squares
 from shared.identification.problem import Variant
 from shared.identification.subject import Subject
@@ -59,33 +60,59 @@ def screen(fit: Fit, candidates: Sequence[Candidate], segments: tuple[int, ...])
     left = fit.residual - basis @ (basis.T @ fit.residual)
     total = float(fit.residual @ fit.residual)
     variants: list[Variant] = []
-    owners: list[tuple[int, int, float]] = []
-    for index, candidate in enumerate(candidates):
+    looks: list[list[tuple[_Look, slice]]] = []
+    for candidate in candidates:
         quantities = candidate.effect.quantities(problem.subject, candidate.place)
-        is_smooth = all(quantity.is_smooth for quantity in quantities)
-        for scale in (1.0,) if is_smooth else GRID:
-            for column, quantity in enumerate(quantities):
-                values = np.zeros(len(quantities))
-                if not is_smooth:
-                    values[:] = [each.probe for each in quantities]
-                values[column] = np.clip(scale * quantity.probe, quantity.low, quantity.high)
-                variants.append(base.with_extra(candidate, values))
-                owners.append((index, column, scale))
+        begun: list[tuple[_Look, slice]] = []
+        for look in _looks(quantities):
+            begin = len(variants)
+            variants += [base.with_extra(candidate, values) for values in look.values]
+            begun.append((look, slice(begin, len(variants))))
+        looks.append(begun)
     found = _signatures(fit, variants, segments)
     out: list[Screened] = []
-    for index, candidate in enumerate(candidates):
-        rows = [row for row, owner in enumerate(owners) if owner[0] == index]
-        scales = sorted({owners[row][2] for row in rows})
+    for candidate, begun in zip(candidates, looks, strict=True):
         tried = [
-            _judge(
-                candidate,
-                found[[row for row in rows if owners[row][2] == scale]].T,
-                scale, basis, left, fit, total,
-            )
-            for scale in scales
-        ]  # fmt: skip
+            _judge(candidate, found[rows].T, look, basis, left, fit, total) for look, rows in begun
+        ]
         out.append(max(tried, key=lambda each: each.share))
     return sorted(out, key=lambda each: -each.share)
+
+
+@dataclass(frozen=True)
+class _Look:
+    """Sizes that are simulated one at a time and then mixed."""
+
+    scale: float
+    """Of the probes."""
+    form: Float64
+    """float64[Q], what is the same for all of them, in probes."""
+    sizes: tuple[int, ...]
+    """The quantities that say how much."""
+    values: tuple[Float64, ...]
+    """float64[Q] for each of them."""
+
+
+def _looks(quantities: Sequence[Quantity]) -> list[_Look]:
+    """Return all combinations of forms, each at all scales."""
+    probes = np.array([each.probe for each in quantities])
+    low, high = (np.array([getattr(each, end) for each in quantities]) for end in ("low", "high"))
+    sizes = tuple(index for index, each in enumerate(quantities) if not each.grid)
+    forms = [index for index, each in enumerate(quantities) if each.grid]
+    is_smooth = all(quantities[index].is_smooth for index in sizes)
+    out: list[_Look] = []
+    for grid in itertools.product(*(quantities[index].grid for index in forms)):
+        form = np.zeros(len(quantities))
+        form[forms] = np.array(grid) / probes[forms]
+        for scale in (1.0,) if is_smooth else GRID:
+            values: list[Float64] = []
+            for index in sizes:
+                each = form.copy()
+                each[list(sizes) if not is_smooth else index] = 1.0
+                each[index] = scale
+                values.append(np.clip(each * probes, low, high))
+            out.append(_Look(scale, form, sizes, tuple(values)))
+    return out
 
 
 def _signatures(fit: Fit, variants: Sequence[Variant], segments: tuple[int, ...]) -> Float64:
@@ -97,23 +124,23 @@ def _signatures(fit: Fit, variants: Sequence[Variant], segments: tuple[int, ...]
 
 
 def _judge(
-    candidate: Candidate, columns: Float64, scale: float, basis: Float64, left: Float64, fit: Fit,
+    candidate: Candidate, columns: Float64, look: _Look, basis: Float64, left: Float64, fit: Fit,
     total: float,
 ) -> Screened:  # fmt: skip
     bare = columns - basis @ (basis.T @ columns)
     size = np.linalg.norm(bare, axis=0)
-    nothing = Screened(
-        candidate, np.zeros(columns.shape[1]), np.zeros(fit.space.size), 0.0, np.zeros(0)
-    )
     if not np.isfinite(size).all() or float(size.max(initial=0.0)) < 1e-6:
-        return nothing
-    best = least_squares(bare, -left)
-    quantities = candidate.effect.quantities(fit.space.problem.subject, candidate.place)
+        return Screened(candidate, look.form, np.zeros(fit.space.size), 0.0, np.zeros(0))
+    found = candidate.effect.quantities(fit.space.problem.subject, candidate.place)
+    quantities = [found[index] for index in look.sizes]
     low = np.array([each.low / each.probe for each in quantities])
     high = np.array([each.high / each.probe for each in quantities])
-    best: Float64 = np.clip(best * scale, low, high) / scale
+    scale = look.scale
+    best: Float64 = np.clip(least_squares(bare, -left) * scale, low, high) / scale
     explained = bare @ best
     share = float(left @ left - (left + explained) @ (left + explained)) / max(total, 1e-12)
     shift = least_squares(fit.jacobian, -(fit.residual + columns @ best))
     direction = explained / max(float(np.linalg.norm(explained)), 1e-12)
-    return Screened(candidate, best * scale, shift, share, direction)
+    start = look.form.copy()
+    start[list(look.sizes)] = best * scale
+    return Screened(candidate, start, shift, share, direction)

@@ -29,10 +29,14 @@ class JointSpring:
         return (
             Quantity("stiffness", f"{joint.torque}/{joint.angle}", 0.0, 4.0 * full, 0.2 * full),
             Quantity(
-                "rest", joint.angle, joint.lowest - joint.travel, highest + joint.travel,
-                probe=max(abs(joint.lowest + 0.5 * joint.travel), 0.25 * joint.travel),
+                "rest",
+                joint.angle,
+                joint.lowest - joint.travel,
+                highest + joint.travel,
+                probe=0.5 * joint.travel,
+                grid=(joint.lowest, 0.5 * (joint.lowest + highest), highest),
             ),
-        )  # fmt: skip
+        )
 
     def structure(self, subject: Subject, place: str) -> Structure:
         """Return nothing: every joint may have a spring."""

@@ -49,6 +49,7 @@ class StribeckFriction:
             Quantity(
                 "falloff", f"{joint.angle}/s", 0.01 * joint.speed, joint.speed,
                 probe=0.1 * joint.speed,
+                grid=(0.03 * joint.speed, 0.1 * joint.speed, 0.3 * joint.speed),
             ),
         )  # fmt: skip
 

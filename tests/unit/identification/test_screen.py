@@ -1,0 +1,55 @@
+"""The screen: the right candidate comes first, with a size and a form near the truth."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shared.identification.catalogue.joint_spring import EFFECT as SPRING
+from shared.identification.catalogue.stribeck_friction import EFFECT as STRIBECK
+from shared.identification.catalogue.torque_bias import EFFECT as BIAS
+from shared.identification.effect import Candidate, Effect
+from shared.identification.fit import polish
+from shared.identification.screen import Screened, screen
+from shared.identification.space import Space
+from shared.sim.plant.row import Row
+from tests.measured import measure, problem_of
+
+_EFFECTS = (SPRING, STRIBECK, BIAS)
+
+
+def screened(folder: Path, effect: Effect, values: list[float]) -> tuple[Screened, list[float]]:
+    """Return the best of three effects at two joints, and its size in units."""
+
+    def enter(row: Row) -> None:
+        effect.enter(row, "elbow", np.array(values))
+
+    problem = problem_of(measure(folder, np.random.default_rng(0), enter, seconds=4.0))
+    space, segments = Space(problem), problem.of("train")
+    fit = polish(space, np.zeros(space.size), segments, 2)
+    candidates = [Candidate(each, place) for each in _EFFECTS for place in ("lift", "elbow")]
+    best = screen(fit, candidates, segments)[0]
+    quantities = best.candidate.effect.quantities(problem.subject, best.candidate.place)
+    probes = np.array([each.probe for each in quantities])
+    return best, (best.start * probes).tolist()
+
+
+def test_a_form_is_tried_where_its_grid_says_and_the_size_is_found_with_it(tmp_path: Path) -> None:
+    best, (excess, falloff) = screened(tmp_path, STRIBECK, [0.4, 0.2])
+    assert best.candidate.label == "stribeck_friction elbow"
+    assert excess == pytest.approx(0.4, rel=0.5)
+    assert 0.05 < falloff < 0.6
+    assert best.share > 0.05  # most of the rest is noise
+
+
+def test_a_spring_is_found_with_a_rest_in_the_joints_range(tmp_path: Path) -> None:
+    best, (stiffness, rest) = screened(tmp_path, SPRING, [2.0, 0.3])
+    assert best.candidate.label == "joint_spring elbow"
+    assert stiffness == pytest.approx(2.0, rel=0.5)
+    assert -0.6 <= rest <= 0.6
+
+
+def test_an_effect_without_a_form_is_looked_at_as_before(tmp_path: Path) -> None:
+    best, (torque,) = screened(tmp_path, BIAS, [0.5])
+    assert best.candidate.label == "torque_bias elbow"
+    assert torque == pytest.approx(0.5, rel=0.3)
