@@ -87,3 +87,21 @@ def sampled_poses(at: Float64, poses: Float64, wanted: Float64) -> Float64:
     out = start + share * (end - start)
     out[:, 3:] /= np.linalg.norm(out[:, 3:], axis=1, keepdims=True)
     return out
+
+
+def pose_error(measured: Float64, predicted: Float64) -> Float64:
+    """Return float64[K, 6]: measured less predicted, position (m) and rotation vector (rad)."""
+    w, x, y, z = measured[:, 3:].T
+    a, b, c, d = predicted[:, 3:].T
+    # measured times the conjugate of predicted, its vector part
+    scalar = w * a + x * b + y * c + z * d
+    vector = np.stack(
+        [
+            -w * b + x * a - y * d + z * c,
+            -w * c + y * a - z * b + x * d,
+            -w * d + z * a - x * c + y * b,
+        ],
+        axis=1,
+    )
+    sign = np.where(scalar < 0.0, -1.0, 1.0)[:, None]
+    return np.concatenate([measured[:, :3] - predicted[:, :3], 2.0 * sign * vector], axis=1)
