@@ -9,11 +9,11 @@ from collections.abc import Callable
 import numpy as np
 
 from shared.identification.dataset.types import Float64
-from shared.sim.plant.encoders import as_if_at
 from shared.sim.plant.inverse import inverse_dynamics
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal, sampled
 from shared.sim.plant.structure import Builder, Edit
+from shared.sim.plant.targets import as_if_at
 
 _PERIOD = 0.02
 """Of the instants at which a recording's load is taken (s)."""

@@ -1,20 +1,15 @@
 """A joint whose encoder is not right: the log and the controller believe what it says."""
 
-import numpy as np
-
-from shared.sim.arm import Float64
-from shared.sim.plant.kinematics import tool_poses
-from shared.sim.plant.poses import conjugate, product
 from shared.sim.plant.row import JointsReport, Row
-from shared.sim.plant.signals import Signal, sampled
+from shared.sim.plant.signals import Signal
+from shared.sim.plant.targets import as_if_at
 
 
 def misread(row: Row, label: str, scale: float, offset: float) -> None:
     """Let the encoder of a joint say ``scale * q + offset`` where the joint is at q.
 
     A servo at the joint holds what the encoder says to its command. A controller of poses takes
-    its forward kinematics of the encoders: as far off as it was along the logged joints, so far
-    off is its target here; at which joint its force acts is left as if it knew the posture.
+    its kinematics of the encoders, see :func:`shared.sim.plant.targets.as_if_at`.
 
     Args:
         row: the arm.
@@ -47,16 +42,3 @@ def misread(row: Row, label: str, scale: float, offset: float) -> None:
         return as_if_at(row, target, believed, Signal(believed.at, true))
 
     row.on_target(follow)
-
-
-def as_if_at(row: Row, target: Signal, believed: Signal, true: Signal) -> Signal:
-    """Return the target that is as far from the true tool as the given one from the believed."""
-    at: Float64 = row.plant.timestep * np.arange(
-        int(np.ceil(row.duration / row.plant.timestep)) + 2, dtype=np.float64
-    )
-    seen = tool_poses(row.plant, row.model, sampled(believed.at, believed.values, at))
-    tool = tool_poses(row.plant, row.model, sampled(true.at, true.values, at))
-    out = target.held(at)
-    out[:, :3] += tool[:, :3] - seen[:, :3]
-    out[:, 3:] = product(out[:, 3:], product(conjugate(seen[:, 3:]), tool[:, 3:]))
-    return Signal(at, out)

@@ -1,11 +1,13 @@
 """Where the tool is at many postures at once, by the kinematics of the model."""
 
+from dataclasses import dataclass
+
 import mujoco
 import numpy as np
 
 from shared.sim.arm import Float64
 from shared.sim.plant.plant import TOOL, Plant
-from shared.sim.plant.poses import inverse, product, rotated, seen_from, turn
+from shared.sim.plant.poses import conjugate, inverse, product, rotated, seen_from, turn
 
 _HOME = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
@@ -20,48 +22,95 @@ def tool_poses(plant: Plant, model: mujoco.MjModel, q: Float64) -> Float64:
         model: of it, compiled; its nominal numbers.
         q: float64[T, J], logged joints (rad, m).
     """
+    tool, base = _ends(plant, model, q)
+    return tool.pose if base is None else seen_from(inverse(base.pose), tool.pose)
+
+
+def tool_jacobians(plant: Plant, model: mujoco.MjModel, q: Float64) -> Float64:
+    """Return float64[T, 6, J]: the tool's velocity and angular velocity by the joints' velocities.
+
+    In the frame of :func:`tool_poses`, which no logged joint moves; of the same arguments.
+    """
+    tool, base = _ends(plant, model, q)
+    out = np.zeros((len(q), 6, len(plant.joints)))
+    for column, joint in tool.joints.items():
+        axis = joint.axis
+        way = axis if joint.is_slide else np.cross(axis, tool.pose[:, :3] - joint.anchor)
+        turning = np.zeros_like(axis) if joint.is_slide else axis
+        if base is not None:
+            back = conjugate(base.pose[:, 3:])
+            way, turning = rotated(back, way), rotated(back, turning)
+        out[:, :3, column], out[:, 3:, column] = way, turning
+    return out
+
+
+@dataclass(frozen=True)
+class _Joint:
+    """A joint in the world, at each posture."""
+
+    anchor: Float64
+    """float64[T, 3] (m)."""
+    axis: Float64
+    """float64[T, 3]."""
+    is_slide: bool
+
+
+@dataclass
+class _End:
+    """What a chain of bodies ends in."""
+
+    pose: Float64
+    """float64[T, 7] in the world."""
+    joints: dict[int, _Joint]
+    """By column of the postures."""
+
+
+def _ends(plant: Plant, model: mujoco.MjModel, q: Float64) -> tuple[_End, _End | None]:
+    """Return the tool, and what its pose is measured from; None is the world."""
     sensor = int(model.sensor(f"{TOOL}/position").id)
     columns = {int(model.joint(name).id): index for index, name in enumerate(plant.joints)}
-    tool = _pose(
-        model, int(model.sensor_objtype[sensor]), int(model.sensor_objid[sensor]), columns, q
-    )
+    kind, index = int(model.sensor_objtype[sensor]), int(model.sensor_objid[sensor])
+    tool = _end(model, kind, index, columns, q)
     if model.sensor_refid[sensor] < 0:
-        return tool
-    base = _pose(
-        model, int(model.sensor_reftype[sensor]), int(model.sensor_refid[sensor]), columns, q
-    )
-    return seen_from(inverse(base), tool)
+        return tool, None
+    kind, index = int(model.sensor_reftype[sensor]), int(model.sensor_refid[sensor])
+    return tool, _end(model, kind, index, columns, q)
 
 
-def _pose(
-    model: mujoco.MjModel, kind: int, index: int, columns: dict[int, int], q: Float64
-) -> Float64:
-    """Return float64[T, 7], a site or a body in the world."""
+def _end(model: mujoco.MjModel, kind: int, index: int, columns: dict[int, int], q: Float64) -> _End:
+    """Return where a site or a body is."""
     is_site = kind == int(mujoco.mjtObj.mjOBJ_SITE)
     body = int(model.site_bodyid[index]) if is_site else index
     chain: list[int] = []
     while body:
         chain.append(body)
         body = int(model.body_parentid[body])
-    pose = np.tile(_HOME, (len(q), 1))
+    end = _End(np.tile(_HOME, (len(q), 1)), {})
     for link in reversed(chain):
-        pose = seen_from(pose, np.concatenate([model.body_pos[link], model.body_quat[link]]))
+        here = np.concatenate([model.body_pos[link], model.body_quat[link]])
+        end.pose = seen_from(end.pose, here)
         first = int(model.body_jntadr[link])
         for joint in range(first, first + int(model.body_jntnum[link])):
             if joint in columns:
                 home = float(model.qpos0[model.jnt_qposadr[joint]])
-                pose = _moved(model, joint, pose, q[:, columns[joint]] - home)
+                _move(model, joint, end, columns[joint], q[:, columns[joint]] - home)
     if is_site:
-        pose = seen_from(pose, np.concatenate([model.site_pos[index], model.site_quat[index]]))
-    return pose
+        here = np.concatenate([model.site_pos[index], model.site_quat[index]])
+        end.pose = seen_from(end.pose, here)
+    return end
 
 
-def _moved(model: mujoco.MjModel, joint: int, pose: Float64, by: Float64) -> Float64:
-    """Return float64[T, 7], a link's pose after its joint has moved by float64[T] (rad, m)."""
-    axis: Float64 = model.jnt_axis[joint]
-    if int(model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_SLIDE):
-        at = pose[:, :3] + rotated(pose[:, 3:], by[:, None] * axis)
-        return np.concatenate([at, pose[:, 3:]], axis=1)
+def _move(model: mujoco.MjModel, joint: int, end: _End, column: int, by: Float64) -> None:
+    """Move a link by its joint: float64[T] (rad, m)."""
+    pose = end.pose
+    own: Float64 = model.jnt_axis[joint]
+    axis = rotated(pose[:, 3:], own)
     anchor = pose[:, :3] + rotated(pose[:, 3:], model.jnt_pos[joint])
-    turned = product(pose[:, 3:], turn(by[:, None] * axis))
-    return np.concatenate([anchor - rotated(turned, model.jnt_pos[joint]), turned], axis=1)
+    is_slide = int(model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
+    end.joints[column] = _Joint(anchor, axis, is_slide)
+    if is_slide:
+        end.pose = np.concatenate([pose[:, :3] + by[:, None] * axis, pose[:, 3:]], axis=1)
+        return
+    turned = product(pose[:, 3:], turn(by[:, None] * own))
+    at = anchor - rotated(turned, model.jnt_pos[joint])
+    end.pose = np.concatenate([at, turned], axis=1)

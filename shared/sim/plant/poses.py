@@ -38,6 +38,15 @@ def turn(vectors: Float64) -> Float64:
     return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * vectors], axis=-1)
 
 
+def rotation_vectors(quaternions: Float64) -> Float64:
+    """Return float64[..., 3], what :func:`turn` makes them of; up to half a turn (rad)."""
+    sign = np.where(quaternions[..., :1] < 0.0, -1.0, 1.0)
+    part = sign * quaternions[..., 1:]
+    sine = np.linalg.norm(part, axis=-1, keepdims=True)
+    half = np.arctan2(sine, sign * quaternions[..., :1])
+    return 2.0 * part / np.sinc(half / np.pi)  # half / sin(half), and 1 at 0
+
+
 def seen_from(frames: Float64, poses: Float64) -> Float64:
     """Return float64[..., 7]: poses that are given in frames, where the frames are given."""
     at = frames[..., :3] + rotated(frames[..., 3:], poses[..., :3])

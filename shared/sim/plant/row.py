@@ -135,6 +135,10 @@ class Row:
             self.fields[name] = np.array(getattr(owner, name.removeprefix("opt.")), np.float64)
         return self.fields[name]
 
+    def current(self, name: str) -> Float64:
+        """Return a field as it is by now, not to be changed."""
+        return self.fields[name] if name in self.fields else getattr(self.model, name)
+
     def dof(self, label: str) -> int:
         """Return the index of a logged joint's velocity in the model."""
         return int(self.model.joint(self.plant.mj_joint(label)).dofadr[0])

@@ -7,8 +7,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from shared.sim.plant.kinematics import tool_poses
+from shared.sim.plant.kinematics import tool_jacobians, tool_poses
 from shared.sim.plant.plant import TOOL, Plant, mjcf, pr2
+from shared.sim.plant.signals import pose_error
 from shared.sim.plant.structure import compiled
 
 _ODD = """
@@ -51,3 +52,22 @@ def test_the_tool_is_where_mujoco_has_it(make: Callable[[Path], Plant], tmp_path
         np.testing.assert_allclose(pose[:3], data.sensordata[first : first + 3], atol=1e-12)
         same = abs(pose[3:] @ data.sensordata[first + 3 : first + 7])
         assert same == pytest.approx(1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("make", [_odd, lambda folder: pr2("right", None)])
+def test_the_jacobian_is_the_derivative_of_the_pose(
+    make: Callable[[Path], Plant], tmp_path: Path
+) -> None:
+    plant = make(tmp_path)
+    model = compiled(plant, ())
+    q = np.random.default_rng(4).uniform(-1.0, 1.0, (3, len(plant.joints)))
+    step = 1e-6
+
+    found = tool_jacobians(plant, model, q)
+
+    for column in range(len(plant.joints)):
+        by = step * np.eye(len(plant.joints))[column]
+        ahead, behind = tool_poses(plant, model, q + by), tool_poses(plant, model, q - by)
+        np.testing.assert_allclose(
+            found[:, :, column], pose_error(ahead, behind) / (2.0 * step), atol=1e-8
+        )

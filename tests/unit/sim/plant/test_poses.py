@@ -2,7 +2,16 @@
 
 import numpy as np
 
-from shared.sim.plant.poses import conjugate, frame, inverse, product, rotated, seen_from, turn
+from shared.sim.plant.poses import (
+    conjugate,
+    frame,
+    inverse,
+    product,
+    rotated,
+    rotation_vectors,
+    seen_from,
+    turn,
+)
 
 QUARTER = turn(np.array([0.0, 0.0, np.pi / 2]))
 
@@ -21,6 +30,12 @@ def test_the_second_rotation_of_a_product_comes_first() -> None:
     tilt = turn(np.array([np.pi / 2, 0.0, 0.0]))
     y = np.array([0.0, 1.0, 0.0])  # tilted to z, which the quarter turn leaves
     np.testing.assert_allclose(rotated(product(QUARTER, tilt), y), [0, 0, 1], atol=1e-15)
+
+
+def test_a_rotation_vector_is_found_again_from_either_sign_of_its_quaternion() -> None:
+    vectors = np.array([[0.0, 0.0, 0.0], [1e-9, 0.0, 0.0], [0.1, -0.2, 0.3], [0.0, 3.1, 0.0]])
+    np.testing.assert_allclose(rotation_vectors(turn(vectors)), vectors, atol=1e-12)
+    np.testing.assert_allclose(rotation_vectors(-turn(vectors)), vectors, atol=1e-12)
 
 
 def test_no_turn_is_the_identity_to_the_last_bit() -> None:
