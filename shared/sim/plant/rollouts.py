@@ -15,7 +15,7 @@ from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.plant import TOOL, Plant
 from shared.sim.plant.row import FrictionLaw, JointsReport, Row, Step, TorqueLaw, TrackerReport
 from shared.sim.plant.signals import Signal, filtered, sampled, sampled_poses
-from shared.sim.plant.structure import Structure, compiled
+from shared.sim.plant.structure import JOINT_MOTORS, MOTOR, Structure, compiled
 
 _CHUNK = 250
 """Steps that a batch takes between two looks at what it recorded."""
@@ -84,6 +84,14 @@ class Rollouts:
         self._columns = np.concatenate(
             [_controls(self.model, int(self.model.actuator(name).id)) for name in plant.actuators]
         )
+        self._motors = np.array(
+            [
+                int(self.model.actuator_ctrladr[self.model.actuator(f"{name}{MOTOR}").id])
+                for name in plant.joints
+                if JOINT_MOTORS in structure
+            ],
+            np.int64,
+        )
         self._batch = mujoco.batch.Batch(self.model, nsim=capacity, nthread=1)
         self._expanded: dict[str, Float64] = {}
         self._stale: set[str] = set()
@@ -129,6 +137,8 @@ class Rollouts:
             ctrl = np.zeros((len(rows), end - begin, self.model.nu))
             for row in rows:
                 ctrl[row.index][:, self._columns] = row.command.held(at[begin:end])
+                for torques in row.fed if len(self._motors) else ():
+                    ctrl[row.index][:, self._motors] += torques.held(at[begin:end])
             found = (
                 self._closed(ids, ctrl, laws, frictions, begin)
                 if has_laws
@@ -144,6 +154,10 @@ class Rollouts:
                           None if tool is None else tool[row.index, :-1], bool(is_bad[row.index]))
             for row, (_, recorded) in zip(rows, work, strict=True)
         ]  # fmt: skip
+
+    def entered(self, entry: Entry, recorded: Recorded) -> Row:
+        """Return an arm with base parameters and effects in it, for those who look what changed."""
+        return self._row(0, entry, recorded)
 
     def _row(self, index: int, entry: Entry, recorded: Recorded) -> Row:
         last = float(recorded.joints_at[-1])
