@@ -1,5 +1,6 @@
 """What is being identified: one arm, how it is driven, and what its recordings reach."""
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from shared.errors import IdentificationError
 from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource, Trajectory
 from shared.identification.motion import motion_of
+from shared.identification.ripples import ripples_of
 from shared.sim.plant.inverse import inverse_dynamics
 from shared.sim.plant.plant import Control, Plant, mjcf, pr2
 from shared.sim.plant.rollouts import Recorded, Rollouts
@@ -42,6 +44,11 @@ class Subject:
     2 % of the time (N m, N)."""
     recordings: tuple[Trajectory, ...] = ()
     """What was recorded, in the order of recording."""
+
+    @functools.cached_property
+    def ripples(self) -> tuple[tuple[float, ...], ...]:
+        """Return where each joint's torque may ripple: the strongest few cycles per rad (m)."""
+        return ripples_of(self.nominal, self.recordings)
 
     @property
     def control(self) -> Control:

@@ -8,14 +8,10 @@ from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
 from shared.identification.passive import at_joint
 from shared.identification.places import moving, place_of, slides
+from shared.identification.ripples import FEWEST, MOST
 from shared.identification.subject import Subject
 from shared.sim.plant.row import Row, Step
 from shared.sim.plant.structure import Structure
-
-_PERIODS = 2.0
-"""Fewer ripples in a joint's travel would be a spring."""
-_MOST = 30.0
-"""More ripples in a joint's travel are too short for encoders at 100 Hz."""
 
 
 class _Law:
@@ -45,16 +41,27 @@ class Cogging:
         return tuple(place.label for place in moving(subject))
 
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
-        """Return amplitudes and the number of ripples per turn (per metre)."""
+        """Return amplitudes and the number of ripples per turn (per metre).
+
+        The data say where to look for the number.
+        """
         joint = place_of(subject, place)
         most = joint.drive
         turn = 1.0 if joint.is_sliding else 2.0 * math.pi
         unit = "1/m" if joint.is_sliding else "1/turn"
-        low, high = _PERIODS * turn / joint.travel, _MOST * turn / joint.travel
+        once = turn / joint.travel
+        known = subject.ripples[subject.joints.index(place)] if subject.recordings else ()
         return (
             Quantity("cosine", joint.torque, -most, most, probe=0.1 * joint.drive),
             Quantity("sine", joint.torque, -most, most, probe=0.1 * joint.drive),
-            Quantity("ripples", unit, low, high, probe=2.0 * low, is_smooth=False),
+            Quantity(
+                "ripples",
+                unit,
+                FEWEST * once,
+                MOST * once,
+                probe=0.5 * once,
+                grid=tuple(turn * each for each in known) or (3.0 * once, 5.0 * once, 8.0 * once),
+            ),
         )
 
     def structure(self, subject: Subject, place: str) -> Structure:

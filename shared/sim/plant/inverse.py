@@ -45,3 +45,36 @@ def inverse_dynamics(
         mujoco.mj_inverse(model, data)
         out[index] = data.qfrc_inverse[dofs]
     return out
+
+
+def missing_torques(
+    plant: Plant, model: mujoco.MjModel, q: Float64, qd: Float64, qdd: Float64, command: Float64
+) -> Float64:
+    """Return float64[T, J]: what a motion takes beyond what the drives would give (N m, N).
+
+    What an extra torque at a joint looks like, without simulating anything.
+
+    Args:
+        plant: the arm; its actuators have no state of their own.
+        model: of it, compiled.
+        q: float64[T, J] (rad, m).
+        qd: float64[T, J] (rad/s, m/s).
+        qdd: float64[T, J] (rad/s^2, m/s^2).
+        command: float64[T, U], in force at each instant.
+    """
+    data = mujoco.MjData(model)
+    joints = [model.joint(name) for name in plant.joints]
+    places = np.array([int(joint.qposadr[0]) for joint in joints])
+    dofs = np.array([int(joint.dofadr[0]) for joint in joints])
+    first = [int(model.actuator_ctrladr[model.actuator(name).id]) for name in plant.actuators]
+    count = [int(model.actuator_ctrlnum[model.actuator(name).id]) for name in plant.actuators]
+    columns = np.concatenate(
+        [np.arange(begin, begin + size) for begin, size in zip(first, count, strict=True)]
+    )
+    given = np.empty_like(q)
+    for index in range(len(q)):
+        data.qpos[places], data.qvel[dofs] = q[index], qd[index]
+        data.ctrl[columns] = command[index]
+        mujoco.mj_forward(model, data)
+        given[index] = data.qfrc_actuator[dofs]
+    return inverse_dynamics(plant, model, q, qd, qdd) - given
