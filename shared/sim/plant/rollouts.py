@@ -136,7 +136,7 @@ class Rollouts:
             end = min(begin + _CHUNK, steps)
             ctrl = np.zeros((len(rows), end - begin, self.model.nu))
             for row in rows:
-                ctrl[row.index][:, self._columns] = row.command.held(at[begin:end])
+                ctrl[row.index][:, self._columns] = row.command.mean(at[begin:end], timestep)
                 for torques in row.fed if len(self._motors) else ():
                     ctrl[row.index][:, self._motors] += torques.held(at[begin:end])
             found = (

@@ -25,6 +25,19 @@ class Signal:
         index = np.searchsorted(self.at, at + 1e-9, side="right") - 1
         return self.values[np.maximum(index, 0)]
 
+    def mean(self, at: Float64, span: float) -> Float64:
+        """Return float64[T, U], the mean over a span from each instant on.
+
+        A command that comes between two steps of the physics counts by how much of the step it
+        is in force, so that a delay changes the motion smoothly.
+        """
+        ends = np.r_[self.at[1:], np.inf]
+        index = np.maximum(np.searchsorted(self.at, at + 1e-9, side="right") - 1, 0)
+        later = np.maximum(np.searchsorted(self.at, at + span - 1e-9, side="right") - 1, 0)
+        share = np.clip((ends[index] - at) / span, 0.0, 1.0)[:, None]
+        now, then = self.values[index], self.values[later]
+        return np.where(index[:, None] == later[:, None], now, share * now + (1.0 - share) * then)
+
     def later(self, seconds: float) -> "Signal":
         """Return the signal delayed; fractions of a period count."""
         return Signal(self.at + seconds, self.values)
