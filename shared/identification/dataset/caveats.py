@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from shared.identification.dataset.checks import velocity_ratio
+from shared.identification.dataset.checks import is_resolved, velocity_ratio
 from shared.identification.dataset.types import Caveat, Control, Float64, Trajectory
 
 GAP_PERIODS: Final = 5.0
@@ -130,7 +130,7 @@ def of_joints(trajectory: Trajectory, joints: Sequence[str]) -> list[Caveat]:
             )))  # fmt: skip
         if trajectory.qd is not None:
             column = trajectory.qd[:, index]
-            is_moving = np.ptp(q[:, index]) > 10.0 * LEAST_RANGE
+            is_moving = np.ptp(q[:, index]) > 10.0 * LEAST_RANGE and is_resolved(column)
             if is_moving and velocity_ratio(times, q[:, index], column) is None:
                 found.append(Caveat("velocity_disagrees", name, (
                     f"the logged velocity of {joint!r} is not the derivative of its position "

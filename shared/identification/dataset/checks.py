@@ -209,7 +209,7 @@ def check_velocities(path: Path, joint: str, times: Float64, q: Float64, qd: Flo
     Raises:
         IdentificationError: they are proportional to it by another factor than 1.
     """
-    ratio = velocity_ratio(times, q, qd)
+    ratio = velocity_ratio(times, q, qd) if is_resolved(qd) else None
     if ratio is None or 0.5 <= ratio <= 2.0:
         return
     name = f"qd_{joint}"
@@ -226,6 +226,32 @@ def check_velocities(path: Path, joint: str, times: Float64, q: Float64, qd: Flo
         f"{path}: column {name!r} is {ratio:.4g} times the derivative of 'q_{joint}', "
         f"expected 1: {advice}"
     )
+
+
+def check_unit(path: Path, joint: str, command: Float64, q: Float64) -> None:
+    """Check that commanded positions are in the unit of a joint's readings.
+
+    Args:
+        path: of the table of commands.
+        joint: whose they are.
+        command: float64[T], the command in force at each reading.
+        q: float64[T] (rad, m).
+
+    Raises:
+        IdentificationError: they follow each other, but for a factor between two units.
+    """
+    wanted, got = command - command.mean(), q - q.mean()
+    sizes = float(np.linalg.norm(wanted)), float(np.linalg.norm(got))
+    if min(sizes) < 1e-3 or float(wanted @ got) < 0.9 * sizes[0] * sizes[1]:
+        return
+    ratio = sizes[0] / sizes[1]
+    for factor, unit in ((180.0 / np.pi, "degrees"), (1000.0, "mrad or mm")):
+        for found, odd in ((ratio / factor, "command"), (ratio * factor, "reading")):
+            if abs(found - 1.0) < 0.25:
+                raise IdentificationError(
+                    f"{path}: column {joint!r} moves {ratio:.4g} times as far as 'q_{joint}', "
+                    f"expected about 1: the {odd} looks like {unit}; write rad or m in both"
+                )
 
 
 def velocity_ratio(times: Float64, q: Float64, qd: Float64) -> float | None:
@@ -249,6 +275,18 @@ def velocity_ratio(times: Float64, q: Float64, qd: Float64) -> float | None:
     slope = float(speed @ logged) / float(speed @ speed)
     correlation = float(speed @ logged) / float(np.linalg.norm(speed) * np.linalg.norm(logged))
     return slope if abs(correlation) > 0.9 else None
+
+
+def is_resolved(qd: Float64) -> bool:
+    """Return whether float64[T] velocities change little enough from row to row to be compared.
+
+    Their correlation with the row before is over 0.5, so a sine has six rows a period or more.
+    """
+    if len(qd) < 20:
+        return False
+    centred = qd - qd.mean()
+    power = float(centred @ centred)
+    return power > 0.0 and float(centred[1:] @ centred[:-1]) > 0.5 * power
 
 
 def check_efforts(table: Table, names: Sequence[str]) -> None:

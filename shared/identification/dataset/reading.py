@@ -131,6 +131,8 @@ def _trajectory(
     else:
         checks.check_finite(command, actuators)
         sent = np.stack([command.columns[each] for each in actuators], axis=1)
+        if manifest.control == "position":
+            _check_units(recording, joints, q)
     still = np.zeros(len(joints)) if qd is None else qd[0]
     made = Trajectory(
         name, entry.split, entry.repeats,
@@ -151,6 +153,15 @@ def _trajectory(
     found += caveats.of_start(made, entry.initial is not None, has_velocity)
     found += caveats.of_joints(made, joints) + caveats.of_tracker(made)
     return made, found
+
+
+def _check_units(recording: Recording, joints: Names, q: Float64) -> None:
+    command, readings = recording.command, recording.readings
+    rows = np.searchsorted(command.t_ns, readings.t_ns, side="right") - 1
+    for index, joint in enumerate(joints):
+        if joint in command.columns:
+            sent = command.columns[joint][np.maximum(rows, 0)]
+            checks.check_unit(command.path, joint, sent, q[:, index])
 
 
 def _positions(

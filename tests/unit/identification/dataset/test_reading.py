@@ -219,6 +219,8 @@ def times(of):
         ("joints", scale(np.pi / 180, "qd_elbow"), "positions look like degrees"),
         ("joints", scale(180 / np.pi, "q_elbow"), "are these degrees or mm?"),
         ("joints", scale(1e3, "qd_elbow"), "looks like mrad/s"),
+        ("command", scale(180 / np.pi, "elbow"), "the command looks like degrees"),
+        ("command", scale(1e-3, "elbow"), "the reading looks like mrad or mm"),
         ("joints", scale(-1.0, "qd_elbow"), "other sign"),
         ("joints", scale(180.0, "q_elbow", "qd_elbow"), "are these degrees or mm?"),
         ("joints", scale(1e6, "effort_elbow"), "mN m"),
@@ -296,3 +298,25 @@ def test_too_many_rows_are_refused_before_they_are_read(tmp_path, monkeypatch):
     folder = written(tmp_path)
     monkeypatch.setattr("shared.identification.dataset.tables.MAX_ROWS", 300)
     assert "has 400 rows of" in refusal(folder)
+
+
+def test_a_command_that_goes_further_than_the_joint_is_no_other_unit(tmp_path):
+    folder = written(tmp_path)
+    changed(folder, "command", scale(3.0, "elbow"))
+    assert read_dataset(folder).trajectories[1].command[:, 1].max() > 2.0
+
+
+@pytest.mark.parametrize("rows", [2, 3, 5, 9])
+def test_very_few_rows_are_enough_to_be_read(tmp_path, rows):
+    folder = written(tmp_path)
+    which = np.linspace(0, 399, rows).astype(int)
+    for seed, name in enumerate(("one", "two", "three")):
+        joints = motion(seed)
+        sparse = {key: values[which] for key, values in joints.items()}
+        table(folder / name / "joints.parquet", sparse)
+        first = {key: values[:1] for key, values in command(joints).items()}
+        table(folder / name / "command.parquet", first)
+        (folder / name / "tracker.parquet").unlink()
+    found = read_dataset(folder)
+    assert found.trajectories[0].q.shape == (rows, 2)
+    assert found.trajectories[0].command.shape == (1, 2)
