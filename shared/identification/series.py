@@ -9,23 +9,25 @@ from collections.abc import Callable
 import numpy as np
 
 from shared.identification.dataset.types import Float64
+from shared.identification.subject import Subject
 from shared.sim.plant.inverse import inverse_dynamics
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal, sampled
-from shared.sim.plant.structure import Builder, Edit
+from shared.sim.plant.structure import JOINT_MOTORS, Builder, Edit, Structure
 from shared.sim.plant.targets import as_if_at
 
 _PERIOD = 0.02
 """Of the instants at which a recording's load is taken (s)."""
 
 
-def series(label: str, part: str) -> Edit:
+def series(subject: Subject, label: str, part: str) -> Structure:
     """Return what puts a second joint behind a logged one."""
 
     def change(builder: Builder) -> None:
         builder.series_joint(label, part)
 
-    return Edit(f"{part} {label}", change)
+    joint = Edit(f"{part} {label}", change)
+    return (joint, JOINT_MOTORS) if subject.control == "pose" else (joint,)
 
 
 def link_inertia(row: Row, joint: int) -> float:

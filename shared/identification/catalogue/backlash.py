@@ -37,7 +37,7 @@ class Backlash:
 
     def structure(self, subject: Subject, place: str) -> Structure:
         """Return the second joint."""
-        return (series(place, _PART),)
+        return series(subject, place, _PART)
 
     def enter(self, row: Row, place: str, values: Float64) -> None:
         """Open the gap; the link starts on the flank that carries it."""

@@ -36,7 +36,7 @@ class JointElasticity:
 
     def structure(self, subject: Subject, place: str) -> Structure:
         """Return the second joint."""
-        return (series(place, _PART),)
+        return series(subject, place, _PART)
 
     def enter(self, row: Row, place: str, values: Float64) -> None:
         """Set the spring."""

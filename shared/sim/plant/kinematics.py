@@ -26,22 +26,26 @@ def tool_poses(plant: Plant, model: mujoco.MjModel, q: Float64) -> Float64:
     return tool.pose if base is None else seen_from(inverse(base.pose), tool.pose)
 
 
-def tool_jacobians(plant: Plant, model: mujoco.MjModel, q: Float64) -> Float64:
-    """Return float64[T, 6, J]: the tool's velocity and angular velocity by the joints' velocities.
+def tool_motion(plant: Plant, model: mujoco.MjModel, q: Float64) -> tuple[Float64, Float64]:
+    """Return :func:`tool_poses` and their Jacobian, of the same arguments.
 
-    In the frame of :func:`tool_poses`, which no logged joint moves; of the same arguments.
+    The Jacobian, float64[T, 6, J], makes velocity and angular velocity of the joints' velocities,
+    in the frame of the poses, which no logged joint moves.
     """
     tool, base = _ends(plant, model, q)
-    out = np.zeros((len(q), 6, len(plant.joints)))
+    jacobian = np.zeros((len(q), 6, len(plant.joints)))
     for column, joint in tool.joints.items():
-        axis = joint.axis
-        way = axis if joint.is_slide else np.cross(axis, tool.pose[:, :3] - joint.anchor)
-        turning = np.zeros_like(axis) if joint.is_slide else axis
-        if base is not None:
-            back = conjugate(base.pose[:, 3:])
-            way, turning = rotated(back, way), rotated(back, turning)
-        out[:, :3, column], out[:, 3:, column] = way, turning
-    return out
+        if joint.is_slide:
+            jacobian[:, :3, column] = joint.axis
+        else:
+            jacobian[:, :3, column] = np.cross(joint.axis, tool.pose[:, :3] - joint.anchor)
+            jacobian[:, 3:, column] = joint.axis
+    if base is None:
+        return tool.pose, jacobian
+    back = conjugate(base.pose[:, None, 3:])
+    for part in (slice(0, 3), slice(3, 6)):
+        jacobian[:, part] = rotated(back, jacobian[:, part].swapaxes(1, 2)).swapaxes(1, 2)
+    return seen_from(inverse(base.pose), tool.pose), jacobian
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from shared.sim.arm import Float64
 from shared.sim.plant.plant import Plant
 from shared.sim.plant.signals import Signal
-from shared.sim.plant.structure import STIFF, armature_for
+from shared.sim.plant.structure import MOTOR, STIFF, armature_for
 
 
 @dataclass
@@ -126,6 +126,7 @@ class Row:
     rests: dict[str, Callable[[float], float]] = dataclasses.field(
         default_factory=dict[str, Callable[[float], float]]
     )
+    fed: list[Signal] = dataclasses.field(default_factory=list[Signal])
     fields: dict[str, Float64] = dataclasses.field(default_factory=dict[str, Float64])
 
     def field(self, name: str) -> Float64:
@@ -191,6 +192,13 @@ class Row:
         """
         self.rests[name] = rests
 
+    def feed(self, torques: Signal) -> None:
+        """Put torques on the logged joints by motors of their own: float64[C, J] (N m, N).
+
+        Of no effect in an arm without :data:`shared.sim.plant.structure.JOINT_MOTORS`.
+        """
+        self.fed.append(torques)
+
     def torque(self, law: TorqueLaw, values: Float64) -> None:
         """Let a law act on this arm: float64[P] are its parameters."""
         self.laws.append((law, np.asarray(values, np.float64)))
@@ -224,5 +232,7 @@ def drives_of(plant: Plant, model: mujoco.MjModel, label: str) -> list[int]:
     return [
         index
         for index, kind in enumerate(model.actuator_trntype)
-        if kind == mujoco.mjtTrn.mjTRN_JOINT and model.actuator_trnid[index, 0] == joint
+        if kind == mujoco.mjtTrn.mjTRN_JOINT
+        and model.actuator_trnid[index, 0] == joint
+        and not model.actuator(index).name.endswith(MOTOR)
     ]

@@ -3,11 +3,13 @@
 import numpy as np
 
 from shared.sim.arm import Float64
-from shared.sim.plant.kinematics import tool_jacobians, tool_poses
+from shared.sim.plant.kinematics import tool_motion
 from shared.sim.plant.poses import conjugate, product, rotation_vectors, turn
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal, sampled
 
+_PERIOD = 0.01
+"""Of the instants at which kinematics are taken (s)."""
 _NEAR = 0.02
 """Either side of an instant that a velocity is taken over (s)."""
 _FIRM = 1e-6
@@ -20,8 +22,8 @@ def as_if_at(row: Row, target: Signal, believed: Signal, true: Signal) -> Signal
     The controller takes pose, velocity and Jacobian of the tool from a believed posture, and turns
     a wrench w into joint torques J_b'w. The simulated servo has the true posture, so its target is
     where its own wrench makes the same torques, as well as a wrench can (least squares of the
-    accelerations). Posture and velocity are those of the recording, not of the replay, and cycles
-    in which torques are limited are not told from others.
+    accelerations); what it cannot, of seven joints, is fed to them. Posture and velocity are those
+    of the recording, not of the replay.
 
     Args:
         row: the arm.
@@ -29,41 +31,55 @@ def as_if_at(row: Row, target: Signal, believed: Signal, true: Signal) -> Signal
         believed: float64[T, J], the logged joints as the controller sees them (rad, m).
         true: float64[T, J], the same as they are.
     """
-    plant, model = row.plant, row.model
-    at: Float64 = plant.timestep * np.arange(
-        int(np.ceil(row.duration / plant.timestep)) + 2, dtype=np.float64
-    )
-    seen, seen_speed, seen_jacobian = _tool(row, believed, at)
-    tool, speed, jacobian = _tool(row, true, at)
+    at: Float64 = np.arange(0.0, row.duration + 2.0 * _PERIOD, _PERIOD, dtype=np.float64)
+    seen, seen_jacobian, seen_speed = _tool(row, believed, at)
+    tool, jacobian, speed = _tool(row, true, at)
     stiffness, damping = _gains(row)
-    out = target.held(at)
-    error = np.concatenate(
-        [
-            out[:, :3] - seen[:, :3],
-            rotation_vectors(product(out[:, 3:], conjugate(seen[:, 3:]))),
-        ],
-        axis=1,
-    )
-    dofs = [int(model.joint(name).dofadr[0]) for name in plant.joints]
-    weighed: Float64 = jacobian / model.dof_M0[dofs]  # accelerations count, not torques
+    given = _mean(target, at)
+    asked = stiffness * _way(seen, given) - damping * seen_speed
+    dofs = [int(row.model.joint(name).dofadr[0]) for name in row.plant.joints]
+    weighed: Float64 = jacobian / row.model.dof_M0[dofs]  # accelerations count, not torques
     square = weighed @ jacobian.transpose(0, 2, 1) + _FIRM * np.eye(6)
     carried = weighed @ seen_jacobian.transpose(0, 2, 1) + _FIRM * np.eye(6)
-    asked = stiffness * error - damping * seen_speed
     wrench = np.linalg.solve(square, carried @ asked[:, :, None])[:, :, 0]
-    way = (wrench + damping * speed) / stiffness
-    out[:, :3] = tool[:, :3] + way[:, :3]
-    out[:, 3:] = product(turn(way[:, 3:]), tool[:, 3:])
-    return Signal(at, out)
+    left = np.einsum("tij,ti->tj", seen_jacobian, asked) - np.einsum("tij,ti->tj", jacobian, wrench)
+    row.feed(Signal(at - 0.5 * _PERIOD, left))
+    shift = _way(given, _moved(tool, (wrench + damping * speed) / stiffness))
+    steps: Float64 = np.arange(0.0, row.duration + row.plant.timestep, row.plant.timestep)
+    return Signal(steps, _moved(target.held(steps), sampled(at, shift, steps)))
+
+
+def _mean(target: Signal, at: Float64) -> Float64:
+    """Return float64[T, 7]: targets on average around instants, as commands go in steps."""
+    offsets = _PERIOD * np.array([-0.4, -0.2, 0.0, 0.2, 0.4])
+    poses = target.held((at[:, None] + offsets).ravel()).reshape(len(at), len(offsets), 7)
+    signs = np.where(np.einsum("toi,ti->to", poses[:, :, 3:], poses[:, 0, 3:]) < 0.0, -1.0, 1.0)
+    poses[:, :, 3:] *= signs[:, :, None]
+    out = poses.mean(axis=1)
+    out[:, 3:] /= np.linalg.norm(out[:, 3:], axis=1, keepdims=True)
+    return out
+
+
+def _way(start: Float64, end: Float64) -> Float64:
+    """Return float64[T, 6], the way (m) and the rotation vector (rad) between poses."""
+    turning = rotation_vectors(product(end[:, 3:], conjugate(start[:, 3:])))
+    return np.concatenate([end[:, :3] - start[:, :3], turning], axis=1)
+
+
+def _moved(start: Float64, way: Float64) -> Float64:
+    """Return float64[T, 7]: the other way round."""
+    turned = product(turn(way[:, 3:]), start[:, 3:])
+    return np.concatenate([start[:, :3] + way[:, :3], turned], axis=1)
 
 
 def _tool(row: Row, joints: Signal, at: Float64) -> tuple[Float64, Float64, Float64]:
-    """Return the tool's pose float64[T, 7], velocity float64[T, 6] and Jacobian."""
+    """Return the tool's pose float64[T, 7], Jacobian and velocity float64[T, 6]."""
     q = sampled(joints.at, joints.values, at)
     ahead = sampled(joints.at, joints.values, at + _NEAR)
     behind = sampled(joints.at, joints.values, at - _NEAR)
-    jacobian = tool_jacobians(row.plant, row.model, q)
-    speed = jacobian @ ((ahead - behind) / (2.0 * _NEAR))[:, :, None]
-    return tool_poses(row.plant, row.model, q), speed[:, :, 0], jacobian
+    pose, jacobian = tool_motion(row.plant, row.model, q)
+    speed = np.einsum("tij,tj->ti", jacobian, (ahead - behind) / (2.0 * _NEAR))
+    return pose, jacobian, speed
 
 
 def _gains(row: Row) -> tuple[Float64, Float64]:

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from shared.sim.plant.kinematics import tool_jacobians, tool_poses
+from shared.sim.plant.kinematics import tool_motion, tool_poses
 from shared.sim.plant.plant import TOOL, Plant, mjcf, pr2
 from shared.sim.plant.signals import pose_error
 from shared.sim.plant.structure import compiled
@@ -63,8 +63,9 @@ def test_the_jacobian_is_the_derivative_of_the_pose(
     q = np.random.default_rng(4).uniform(-1.0, 1.0, (3, len(plant.joints)))
     step = 1e-6
 
-    found = tool_jacobians(plant, model, q)
+    poses, found = tool_motion(plant, model, q)
 
+    np.testing.assert_array_equal(poses, tool_poses(plant, model, q))
     for column in range(len(plant.joints)):
         by = step * np.eye(len(plant.joints))[column]
         ahead, behind = tool_poses(plant, model, q + by), tool_poses(plant, model, q - by)
