@@ -1,0 +1,1 @@
+"""Writes data sets with something hidden in them. What it hides, only a judge may read."""

@@ -1,0 +1,172 @@
+"""Chooses what is hidden: what was asked for, and draws what was not said."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from shared.config.site import nearest
+from shared.errors import IdentificationError, SimulationError
+from shared.identification.hidden.recipe import Recipe, Wish
+from shared.identification.hidden.recording import Plan
+from shared.identification.hidden.sizing import Yardstick
+from shared.sim.hidden import spread
+from shared.sim.hidden.arms import HiddenArm
+from shared.sim.hidden.effect import IN, SHAPE, Case, Hidden, Scene, hidden_effects
+from shared.sim.hidden.robot import Robot
+
+_DRAWS: Final = 12
+"""Times that an effect is drawn anew which does not show enough."""
+_ONCE: Final = ("external_contact", "tracker_slip")
+"""Events: they are sized on the recordings to fit to."""
+
+
+@dataclass(frozen=True)
+class Factory:
+    """Makes robots of one number of a series, with effects in them."""
+
+    recipe: Recipe
+    arm: HiddenArm
+    own: spread.Spread
+    scene: Scene
+
+    def make(self, cases: Sequence[Case]) -> Robot:
+        """Return a robot with effects in it."""
+        robot = Robot(self.arm.make(), self.recipe.timestep)
+        spread.enter(robot, self.own)
+        for case in cases:
+            hidden_effects()[case.name].enter(robot, case)
+        return robot
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """An effect that is hidden."""
+
+    hidden: Hidden
+    case: Case
+    share: float | None
+    """Of the residual, that it makes; None where it was not measured."""
+
+
+def choose(factory: Factory, made: Sequence[Plan], rng: np.random.Generator) -> tuple[Chosen, ...]:
+    """Return what is hidden in a robot: what was wished for, then what is drawn.
+
+    Args:
+        factory: makes the robots that sizes are tried on.
+        made: the recordings.
+        rng: what is drawn from.
+
+    Raises:
+        IdentificationError: a wish cannot be fulfilled.
+    """
+    recipe, rulers = factory.recipe, _Rulers(factory, made)
+    found = [_fulfilled(factory, rulers, wish, rng) for wish in recipe.wishes]
+    for _ in range(recipe.random):
+        taken = {each.hidden.name for each in found} | recipe.without
+        names = [
+            name
+            for name, hidden in hidden_effects().items()
+            if name not in taken and hidden.places(factory.scene)
+        ]
+        for _ in range(_DRAWS):
+            wish = Wish(names[int(rng.integers(len(names)))])
+            drawn = _fulfilled(factory, rulers, wish, rng)
+            if _shows(recipe, drawn):
+                found.append(drawn)
+                break
+        else:
+            raise IdentificationError(
+                f"none of {_DRAWS} effects drawn at random shows enough in this motion; "
+                "leave --gentle out, make it longer, or name an effect and its size"
+            )
+    return tuple(found)
+
+
+def _shows(recipe: Recipe, chosen: Chosen) -> bool:
+    return chosen.share is None or chosen.share >= 0.5 * recipe.shares[0]
+
+
+def _fulfilled(factory: Factory, rulers: "_Rulers", wish: Wish, rng: np.random.Generator) -> Chosen:
+    """Return a wish with place and size; drawn anew while it does not show and may move."""
+    found = _drawn(factory, rulers, wish, rng)
+    if wish.place is None and wish.size is None:
+        for _ in range(_DRAWS):
+            if _shows(factory.recipe, found):
+                break
+            found = _drawn(factory, rulers, wish, rng)
+    return found
+
+
+class _Rulers:
+    """Yardsticks for what lasts and for what happens once, made when they are needed."""
+
+    def __init__(self, factory: Factory, made: Sequence[Plan]) -> None:
+        self._factory, self._plans = factory, made
+        self._made: dict[str, Yardstick] = {}
+
+    def of(self, name: str) -> Yardstick:
+        """Return the yardstick for an effect."""
+        split = "train" if name in _ONCE else "test"
+        if split not in self._made:
+            factory = self._factory
+            chosen = [plan for plan in self._plans if plan.split == split and not plan.repeats]
+            self._made[split] = Yardstick(
+                factory.recipe, factory.arm, lambda: factory.make(()), chosen
+            )
+        return self._made[split]
+
+
+def _drawn(factory: Factory, rulers: _Rulers, wish: Wish, rng: np.random.Generator) -> Chosen:
+    recipe, hidden = factory.recipe, hidden_effects()[wish.name]
+    places = _places(hidden, factory.scene)
+    place, shape = wish.place, rng.uniform(size=SHAPE)
+    if place is None:
+        place = places[int(rng.integers(len(places)))]
+    if place not in places:
+        raise IdentificationError(
+            f"{wish.name} cannot be at {place!r} of {recipe.arm}; {nearest(place, places)}"
+        )
+    low_odds, high_odds = (share / (1.0 - share) for share in recipe.shares)
+    power = float(np.exp(rng.uniform(math.log(low_odds), math.log(high_odds))))
+
+    def make(size: float) -> Robot:
+        return factory.make([Case(wish.name, factory.scene, place, size, shape)])
+
+    size, share = wish.size, None
+    if size is None:
+        low, high = hidden.sizes(factory.scene, place)
+        size = rulers.of(wish.name).size_for(power / (1.0 + power), low, high, make)
+    if wish.size is None or recipe.has_shares:
+        try:
+            found = rulers.of(wish.name).power(make(size))
+        except SimulationError as error:
+            raise IdentificationError(
+                f"{wish.name} of size {size:g} is too much: {error}"
+            ) from None
+        share = found / (1.0 + found)
+    return Chosen(hidden, Case(wish.name, factory.scene, place, size, shape), share)
+
+
+def _places(hidden: Hidden, scene: Scene) -> tuple[str, ...]:
+    """Return where an effect may be; an event not in the recording that is made twice."""
+    places = hidden.places(scene)
+    if not places:
+        raise IdentificationError(
+            f"{hidden.name} cannot be in {scene.arm.name}; leave it out, or choose another --arm"
+        )
+    if hidden.name not in _ONCE:
+        return places
+    twice = scene.trajectories[:2]
+    found = tuple(
+        place
+        for place in places
+        if (name := place.rsplit(IN, 1)[-1]) in scene.train and name not in twice
+    )
+    if not found:
+        raise IdentificationError(
+            f"{hidden.name} needs a second recording to fit to: more --trajectories"
+        )
+    return found
