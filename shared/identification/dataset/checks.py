@@ -107,7 +107,7 @@ def check_finite(table: Table, names: Sequence[str]) -> None:
 
 
 def poses_of(table: Table) -> Float64:
-    """Return float64[N, 7], the poses of a table, their quaternions at unit length.
+    """Return float64[N, 7], the poses of a table, their quaternions of unit length and one sign.
 
     Raises:
         IdentificationError: a column is missing, a value is not finite, a quaternion is not of
@@ -134,6 +134,9 @@ def poses_of(table: Table) -> Float64:
         )
     loose = np.abs(lengths - 1.0) > 1e-9
     poses[loose, 3:] /= lengths[loose, None]
+    # q and -q are one rotation; what is between two poses is taken of neighbours of one sign
+    turns = np.einsum("ij,ij->i", poses[1:, 3:], poses[:-1, 3:])
+    poses[1:, 3:] *= np.cumprod(np.where(turns < 0.0, -1.0, 1.0))[:, None]
     return poses
 
 
