@@ -65,5 +65,6 @@ def _followed(row: Row, label: str, bent: Callable[[Float64], Float64]) -> tuple
     qdd = np.gradient(qd, _PERIOD, axis=0)
     load = inverse_dynamics(row.plant, row.model, q, qd, qdd, is_of_links=True)
     joint = row.plant.labels.index(label)
-    q[:, joint] += bent(load[:, joint])
-    return at, q
+    true = logged.values.copy()  # not the local mean: a link that is not off stays where it was
+    true[:, joint] += np.interp(logged.at, at, bent(load[:, joint]))
+    return logged.at, true
