@@ -9,6 +9,10 @@ from shared.identification.subject import Subject
 from shared.sim.plant.row import Row, Step
 from shared.sim.plant.structure import Structure
 
+_LOOKS = 60
+"""Windows at all joints of all recordings together, about: each has to be simulated."""
+_MOST_WINDOWS = 12
+"""Of one recording."""
 _IN = " in "
 """Between the joint and the recording in the name of a place."""
 
@@ -46,15 +50,19 @@ class ExternalContact:
         )
 
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
-        """Return the torque and its window: the probe pushes for half a second in the middle."""
-        joint = place_of(subject, place.split(_IN, 1)[0])
+        """Return the torque and its window, looked for in windows that cover the recording."""
+        name, trajectory = place.split(_IN, 1)
+        joint = place_of(subject, name)
         most = 20.0 * joint.drive
+        until = _duration(subject, trajectory)
+        places = len(subject.joints) * len(subject.trajectories)
+        count = int(np.clip(_LOOKS // places, 2, _MOST_WINDOWS))
+        length = until / count
+        begins = tuple(float(begin) for begin in length * np.arange(count))
         return (
             Quantity("torque", joint.torque, -most, most, probe=0.5 * joint.drive),
-            Quantity(
-                "begin", "s", 0.0, subject.duration, probe=0.5 * subject.duration, is_smooth=False
-            ),
-            Quantity("length", "s", 0.0, subject.duration, probe=0.5, is_smooth=False),
+            Quantity("begin", "s", 0.0, until, probe=length, grid=begins),
+            Quantity("length", "s", 0.0, until, probe=length, grid=(length,)),
         )
 
     def structure(self, subject: Subject, place: str) -> Structure:
@@ -71,6 +79,12 @@ class ExternalContact:
         torques[row.plant.labels.index(joint)] = torque
         begin -= row.begin
         row.torque(_PUSH, np.concatenate([[begin, begin + length], torques]))
+
+
+def _duration(subject: Subject, trajectory: str) -> float:
+    """Return how long a recording is; the longest if there is none of the name (s)."""
+    found = [each.duration for each in subject.recordings if each.name == trajectory]
+    return found[0] if found else subject.duration
 
 
 EFFECT = ExternalContact()
