@@ -1,6 +1,6 @@
 """Fits a space to recordings: CMA-ES as in the paper, then least squares from several starts."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,7 +44,13 @@ def least_squares(columns: Float64, wanted: Float64) -> Float64:
     return np.asarray(np.linalg.lstsq(columns, wanted, rcond=1e-8)[0], np.float64)
 
 
-def polish(space: Space, start: Float64, segments: tuple[int, ...], steps: int = _MAX_STEPS) -> Fit:
+def polish(
+    space: Space,
+    start: Float64,
+    segments: tuple[int, ...],
+    steps: int = _MAX_STEPS,
+    enough: float = _ENOUGH,
+) -> Fit:
     """Return a local fit by Levenberg-Marquardt steps within bounds.
 
     A step is tried at several dampings at once, for a look at five vectors costs a fraction of the
@@ -55,17 +61,14 @@ def polish(space: Space, start: Float64, segments: tuple[int, ...], steps: int =
         start: float64[n].
         segments: recordings to fit to.
         steps: the most derivatives.
+        enough: a step that takes off less than this share of the cost is the last one.
     """
-    low, high = space.bounds
     z, damping = space.clip(start), 1e-2
     for _ in range(steps):
         residual, jacobian = space.jacobian(z, segments)
         cost = 0.5 * float(residual @ residual)
-        gradient = jacobian.T @ residual
-        is_free = ~(((z <= low) & (gradient > 0.0)) | ((z >= high) & (gradient < 0.0)))
-        curve = jacobian.T @ jacobian
-        dampings = damping * np.array(_DAMPINGS)
-        tries = [_step(space, z, gradient, curve, is_free, each) for each in dampings]
+        dampings = [damping * factor for factor in _DAMPINGS]
+        tries = damped(space, z, residual, jacobian, dampings)
         found = space.residual(tries, segments)
         costs = 0.5 * np.sum(found**2, axis=1)
         best = int(np.argmin(costs))
@@ -75,24 +78,74 @@ def polish(space: Space, start: Float64, segments: tuple[int, ...], steps: int =
                 break
             continue
         z, damping = tries[best], float(np.clip(dampings[best], 1e-9, 1e3))
-        if costs[best] > cost * (1 - _ENOUGH):
+        if costs[best] > cost * (1 - enough):
             break
+    return _at(space, z, segments)
+
+
+def damped(
+    space: Space, z: Float64, residual: Float64, jacobian: Float64, dampings: list[float]
+) -> list[Float64]:
+    """Return where Levenberg-Marquardt steps lead, one a damping, within bounds."""
+    low, high = space.bounds
+    gradient = jacobian.T @ residual
+    is_free = ~(((z <= low) & (gradient > 0.0)) | ((z >= high) & (gradient < 0.0)))
+    free = (jacobian.T @ jacobian)[np.ix_(is_free, is_free)]
+    scale = np.diag(np.maximum(np.diag(free), 1e-9))
+    out: list[Float64] = []
+    for damping in dampings:
+        moved = z.copy()
+        moved[is_free] -= np.linalg.solve(free + damping * scale, gradient[is_free])
+        out.append(space.clip(moved))
+    return out
+
+
+@dataclass(frozen=True)
+class Start:
+    """A vector and the derivative there."""
+
+    z: Float64
+    jacobian: Float64
+    """float64[M + n, n]."""
+
+
+@dataclass(frozen=True)
+class BaseFits:
+    """The base at its best, on short parts and on whole recordings."""
+
+    nominal: Start
+    """On short parts."""
+    parts: Fit
+    whole: Fit
+
+
+@dataclass(frozen=True)
+class SavedFits:
+    """What it takes to have a base fit again."""
+
+    parts: tuple[float, ...]
+    whole: tuple[float, ...]
+    starts_agree: bool
+
+
+def fit_again(space: Space, saved: SavedFits) -> BaseFits:
+    """Return a base fit that was found before."""
+    problem = space.problem
+    parts = Space(problem.windowed(WINDOW), space.candidates)
+    origin, pieces = np.zeros(space.size), parts.problem.of("train")
+    nominal = Start(origin, parts.jacobian(origin, pieces)[1])
+    begun = _at(parts, np.array(saved.parts), pieces)
+    whole = _at(space, np.array(saved.whole), problem.of("train"))
+    agree = saved.starts_agree
+    return BaseFits(nominal, begun, replace(whole, starts_agree=agree))
+
+
+def _at(space: Space, z: Float64, segments: tuple[int, ...]) -> Fit:
     residual, jacobian = space.jacobian(z, segments)
     return Fit(space, z, residual, jacobian, 0.5 * float(residual @ residual))
 
 
-def _step(
-    space: Space, z: Float64, gradient: Float64, curve: Float64, is_free: np.ndarray, damping: float
-) -> Float64:
-    """Return where one damping leads: Marquardt's scaling, within bounds."""
-    out = z.copy()
-    free = curve[np.ix_(is_free, is_free)]
-    scaled = free + damping * np.diag(np.maximum(np.diag(free), 1e-9))
-    out[is_free] -= np.linalg.solve(scaled, gradient[is_free])
-    return space.clip(out)
-
-
-def fit_base(space: Space, rng: np.random.Generator) -> Fit:
+def fit_base(space: Space, rng: np.random.Generator) -> BaseFits:
     """Return the base's fit on the training recordings, the better one of two starts.
 
     One start is nominal and goes by way of short parts that each begin at the measured state:
@@ -102,16 +155,19 @@ def fit_base(space: Space, rng: np.random.Generator) -> Fit:
     problem = space.problem
     segments = problem.of("train")
     parts = Space(problem.windowed(WINDOW), space.candidates)
-    begun = polish(parts, np.zeros(space.size), parts.problem.of("train"), 4)
-    problem.rollouts += parts.problem.rollouts
+    origin = np.zeros(space.size)
+    pieces = parts.problem.of("train")
+    nominal = Start(origin, parts.jacobian(origin, pieces)[1])
+    begun = polish(parts, origin, pieces, 6)
     seed = int(rng.integers(1, 2**31 - 1))
 
     def losses(zs: Float64) -> Float64:
         found = space.residual([space.clip(z) for z in zs], segments[:1])
         return np.sum(np.minimum(found**2, 1e8), axis=1)
 
-    searched = minimize(losses, np.zeros(space.size), *space.bounds, sigma=0.3, seed=seed)
-    fits = [polish(space, start, segments) for start in (begun.z, searched)]
+    searched = minimize(losses, origin, *space.bounds, sigma=0.3, seed=seed)
+    fits = [polish(space, start, segments, 6) for start in (begun.z, searched)]
     best = min(fits, key=lambda fit: fit.cost)
     agree = max(fit.cost for fit in fits) <= best.cost * (1 + AGREE) + 1.0
-    return Fit(space, best.z, best.residual, best.jacobian, best.cost, agree)
+    whole = Fit(space, best.z, best.residual, best.jacobian, best.cost, agree)
+    return BaseFits(nominal, begun, whole)

@@ -5,6 +5,7 @@ It has everything that a model cannot know: sensors, and whatever pushes the arm
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -16,6 +17,8 @@ _BAND = 25
 """Without repeats: readings that a local cubic is taken through."""
 _STRETCH = 25
 """Blocks whose power is looked at together."""
+_SAMPLES = 200
+"""Of simulated noise, to learn what leaving out the noisiest stretches takes off."""
 
 
 @dataclass(frozen=True)
@@ -129,9 +132,26 @@ def _floor(parts: list[Float64], scale: float) -> tuple[Float64, Float64]:
         for begin in range(0, max(len(part) - _STRETCH + 1, 1), _STRETCH)
     ]
     power = np.array([np.mean(stretch**2, axis=0) for stretch in stretches])
-    kept = np.sort(power, axis=0)[: max(int(np.ceil(0.8 * len(power))), 1)]
-    variance = kept.mean(axis=0)
     whole = np.concatenate(parts)
     moved = np.concatenate([part[1:] * part[:-1] for part in parts]).mean(axis=0)
     total = np.maximum(np.mean(whole**2, axis=0), 1e-30)
-    return scale * np.sqrt(np.maximum(variance, 1e-16)), np.clip(moved / total, 0.0, 0.99)
+    correlation = np.clip(moved / total, 0.0, 0.99)
+    variance = _quieter(power) / _lost(float(correlation.mean()), len(power))
+    return scale * np.sqrt(np.maximum(variance, 1e-16)), correlation
+
+
+def _quieter(power: Float64) -> Float64:
+    """Return the mean over stretches without the noisiest fifth."""
+    return np.sort(power, axis=0)[: max(int(np.ceil(0.8 * len(power))), 1)].mean(axis=0)
+
+
+@cache
+def _lost(correlation: float, stretches: int) -> float:
+    """Return which share of the power that leaves of noise that is the same everywhere."""
+    rng = np.random.default_rng(0)
+    noise = np.empty((_STRETCH, stretches, _SAMPLES))
+    noise[0] = rng.standard_normal((stretches, _SAMPLES))
+    for index in range(1, _STRETCH):
+        fresh = rng.standard_normal((stretches, _SAMPLES))
+        noise[index] = correlation * noise[index - 1] + np.sqrt(1 - correlation**2) * fresh
+    return float(_quieter(np.mean(noise**2, axis=0)).mean())

@@ -1,0 +1,152 @@
+"""Finds what a simulation gets wrong, and says so."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from shared.identification.catalogue import effects
+from shared.identification.conclude import Conclusion, conclude, extended
+from shared.identification.dataset.types import Dataset
+from shared.identification.effect import Effect
+from shared.identification.evidence import Evidence
+from shared.identification.gathered import evidence_of
+from shared.identification.leftover import leftovers
+from shared.identification.problem import Variant
+from shared.identification.progress import Progress, silent
+from shared.identification.saved import load, save
+from shared.identification.search import Search, begin, search
+from shared.identification.verdict import Unexplained, Verdict
+from shared.runtime.build import commit
+from shared.runtime.service import version
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A verdict and what it is drawn from."""
+
+    verdict: Verdict
+    evidence: Evidence
+
+
+def identify(
+    dataset: Dataset,
+    *,
+    seed: int = 0,
+    progress: Progress = silent,
+    resume_folder: Path | None = None,
+    without: Sequence[str] = (),
+    catalogue: Sequence[Effect] | None = None,
+) -> Finding:
+    """Return what the simulation of a data set gets wrong.
+
+    Args:
+        dataset: the recordings; ``truth.toml`` beside them is never read.
+        seed: of everything random.
+        progress: is told how far it is.
+        resume_folder: where the base fit is kept, and taken from if it is of the same data.
+        without: effects of the catalogue to leave out.
+        catalogue: other effects than the project's.
+
+    Raises:
+        IdentificationError: the model does not fit the recordings, or an effect is unknown.
+    """
+    clock = _Stages()
+    known = effects() if catalogue is None else tuple(catalogue)
+    found = begin(
+        dataset,
+        seed=seed,
+        progress=progress,
+        without=frozenset(without),
+        catalogue=known,
+        fits=None if resume_folder is None else load(resume_folder, dataset, seed),
+    )
+    if resume_folder is not None:
+        save(resume_folder, dataset, seed, found)
+    clock.over("base fit")
+    search(found, progress)
+    clock.over("search")
+    progress("unexplained", 0.0)
+    left = _left(found)
+    clock.over("unexplained")
+    progress("diagnostics", 0.0)
+    evidence = _evidence(found)
+    conclusion = conclude(found, left)
+    clock.over("diagnostics")
+    return Finding(_verdict(found, conclusion, left, dataset, seed, clock.seconds), evidence)
+
+
+def _left(found: Search) -> tuple[Unexplained, ...]:
+    everything = (*found.problem.of("train"), *found.problem.of("test"))
+    return leftovers(found.problem, extended(found), everything)
+
+
+def _evidence(found: Search) -> Evidence:
+    nominal = Variant(np.zeros(len(found.problem.parameters)))
+    base = found.base.space.variant(found.base.z)
+    return evidence_of(
+        found.problem, {"nominal": nominal, "base_fit": base, "extended": extended(found)}
+    )
+
+
+def _verdict(
+    found: Search,
+    conclusion: Conclusion,
+    left: tuple[Unexplained, ...],
+    dataset: Dataset,
+    seed: int,
+    seconds: dict[str, float],
+) -> Verdict:
+    return Verdict(
+        verdict=conclusion.word,
+        sentence=conclusion.sentence,
+        causes=conclusion.causes,
+        ties=conclusion.ties,
+        unexplained=left,
+        held_out=conclusion.held_out,
+        candidates=conclusion.candidates,
+        ruled_out=found.ruled_out,
+        base=conclusion.base,
+        caveats=tuple(f"{each.trajectory}: {each.text}".lstrip(": ") for each in dataset.caveats),
+        record_next=_record_next(conclusion, dataset),
+        starts_agree=found.base.starts_agree,
+        dataset=dataset.hash,
+        model=dataset.source.kind,
+        seed=seed,
+        version=version(),
+        commit=commit(),
+        cpu_s=sum(seconds.values()),
+        seconds=seconds,
+    )
+
+
+def _record_next(conclusion: Conclusion, dataset: Dataset) -> tuple[str, ...]:
+    """Return what would make the next verdict surer."""
+    out = [tie.record for tie in conclusion.ties]
+    names = {each.name for each in dataset.caveats}
+    if "no_repeat" in names:
+        out.append("Repeat one recording: without a repeat the noise floor is a guess.")
+    if "no_tracker" in names:
+        out.append(
+            "Log a tracker beside the joints: what gives or lies behind the encoders does not "
+            "show without one."
+        )
+    if conclusion.word in ("unexplained", "base_too_coarse"):
+        out.append("Record the whole programme of `riposte identify excite`, joint by joint.")
+    return tuple(out)
+
+
+class _Stages:
+    """CPU seconds by stage."""
+
+    def __init__(self) -> None:
+        self._last = time.process_time()
+        self.seconds: dict[str, float] = {}
+
+    def over(self, stage: str) -> None:
+        """Take note that a stage is over."""
+        now = time.process_time()
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self._last
+        self._last = now

@@ -1,0 +1,101 @@
+"""Decides on recordings that nothing was fitted to.
+
+The training loss always prefers more parameters: of ten data sets without a hidden effect ten had
+one named by an information criterion. So a cause counts only by what it takes off the held-out
+loss, stretch by stretch, with an interval.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shared.identification.dataset.types import Float64
+from shared.identification.problem import BLOCK, Problem, Variant
+
+STRETCH = 0.5
+"""What is resampled: longer than noise or the arm remembers (s)."""
+FLOOR = 1.15
+"""Mean square residual of a right model, in noise floors: a repeat or two measure the floor only
+so well, and no base fit is perfect."""
+LEAST_SHARE = 0.05
+"""Of the base fit's explainable held-out loss that a cause must take off to be of use."""
+LEAST_GAIN = 0.12
+"""Of the held-out loss that is left when it comes, the same."""
+_DRAWS = 2000
+
+
+def floor_of(base: float) -> float:
+    """Return what a right model would leave, given what the base fit leaves."""
+    return min(FLOOR, 0.7 * base)
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What a model takes off the held-out loss of another."""
+
+    loss: float
+    """Mean square residual of the better one, in noise floors."""
+    before: float
+    """Of the other."""
+    low: float
+    """95 % interval of the difference."""
+    high: float
+    surely: float
+    """Low end of the 99 % interval."""
+    error: float
+    """Standard error of the difference."""
+
+    @property
+    def gain(self) -> float:
+        """Return the difference."""
+        return self.before - self.loss
+
+    def share(self, base: float) -> float:
+        """Return it as a share of what is explainable: float base is the base fit's loss."""
+        return self.gain / (base - floor_of(base))
+
+    def share_interval(self, base: float) -> tuple[float, float]:
+        """Return the 95 % interval of :meth:`share`."""
+        explainable = base - floor_of(base)
+        return self.low / explainable, self.high / explainable
+
+    def is_useful(self, base: float) -> bool:
+        """Return whether it passes: surely better, and by enough."""
+        return (
+            self.surely > 0.0
+            and self.share(base) >= LEAST_SHARE
+            and self.gain >= LEAST_GAIN * self.before
+        )
+
+
+def stretches(problem: Problem, variant: Variant, segments: tuple[int, ...]) -> Float64:
+    """Return float64[S], mean square residual of each stretch of ``STRETCH``."""
+    size = round(STRETCH / BLOCK)
+    found: list[float] = []
+    for part in problem.residuals([variant], segments)[0]:
+        power = np.mean(part**2, axis=1)
+        count = max(len(power) // size, 1)
+        found += [float(np.mean(piece)) for piece in np.array_split(power, count)]
+    return np.array(found)
+
+
+def compare(before: Float64, after: Float64, rng: np.random.Generator) -> Gain:
+    """Return what is taken off, by bootstrap over stretches.
+
+    Args:
+        before: float64[S].
+        after: float64[S], of the same stretches.
+        rng: draws.
+    """
+    difference = before - after
+    picks = rng.integers(0, len(difference), (_DRAWS, len(difference)))
+    means = difference[picks].mean(axis=1)
+    low, high, surely = np.quantile(means, [0.025, 0.975, 0.005])
+    return Gain(
+        loss=float(after.mean()),
+        before=float(before.mean()),
+        low=float(low),
+        high=float(high),
+        surely=float(surely),
+        error=float(means.std()),
+    )
