@@ -49,10 +49,12 @@ def draw(arm: HiddenArm, share: float, is_imperfect: bool, rng: np.random.Genera
 
     Args:
         arm: of which series.
-        share: standard deviation of the logarithm of each factor.
+        share: standard deviation of the logarithm of each factor; 0 is the model file's robot.
         is_imperfect: links weigh and turn up to 10 % more or less, too.
         rng: what is drawn from.
     """
+    if not share:
+        return nominal(arm)
     joints, actuators = len(arm.rest), len(arm.make().actuators)
 
     def factors(count: int) -> Float64:

@@ -89,7 +89,7 @@ def test_every_hidden_effect_is_in_the_catalogue_by_its_name_quantities_and_unit
     catalogue = {each.name: each for each in effects()}
     assert set(hidden_effects()) <= set(catalogue)
     for arm in ("pr2", "arm3", "torque2"):
-        dataset, _ = simulated(small(arm=arm))
+        dataset, _ = simulated(small(arm=arm, seconds=2.5))
         subject = subject_of(dataset)
         for name, hidden in hidden_effects().items():
             check_numbers(subject, catalogue[name], hidden, arm, dataset)
@@ -101,7 +101,7 @@ def check_numbers(subject, effect, hidden, arm, dataset):
 
     scene = Scene(
         ARMS[arm], tuple(each.name for each in dataset.trajectories),
-        tuple(each.name for each in dataset.train), 2.0,
+        tuple(each.name for each in dataset.train), 2.5,
     )  # fmt: skip
     known = effect.places(subject)
     for place in hidden.places(scene):
