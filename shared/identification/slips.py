@@ -3,9 +3,9 @@
 import numpy as np
 
 from shared.identification.dataset.types import Float64, Trajectory
-from shared.identification.subject import Subject
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.poses import conjugate, rotated
+from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.signals import sampled
 
 _WINDOW = 0.25
@@ -16,13 +16,18 @@ _CLEAR = 4.0
 """A step is worth a look from so many times the median one."""
 
 
-def slip_of(subject: Subject, recording: Trajectory) -> float | None:
-    """Return the likeliest instant, on the tracker's clock (s); None if no step stands out."""
+def slip_of(rollouts: Rollouts, recording: Trajectory) -> float | None:
+    """Return the likeliest instant, on the tracker's clock (s); None if no step stands out.
+
+    Args:
+        rollouts: of the arm as the model has it.
+        recording: of it.
+    """
     if recording.tracker_at is None or recording.tracker is None:
         return None
     at = recording.tracker_at
     q = sampled(recording.joints_at, recording.q, at)
-    expected = tool_poses(subject.plant, subject.nominal.model, q)
+    expected = tool_poses(rollouts.plant, rollouts.model, q)
     off = rotated(conjugate(expected[:, 3:]), recording.tracker[:, :3] - expected[:, :3])
     count = max(_FEWEST, round(_WINDOW / float(np.median(np.diff(at)))))
     if len(at) < 4 * count:

@@ -9,6 +9,7 @@ from shared.errors import IdentificationError
 from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource, Trajectory
 from shared.identification.motion import motion_of
 from shared.identification.ripples import ripples_of
+from shared.identification.slips import slip_of
 from shared.sim.plant.inverse import inverse_dynamics
 from shared.sim.plant.plant import Control, Plant, mjcf, pr2
 from shared.sim.plant.rollouts import Recorded, Rollouts
@@ -49,6 +50,16 @@ class Subject:
     def ripples(self) -> tuple[tuple[float, ...], ...]:
         """Return where each joint's torque may ripple: the strongest few cycles per rad (m)."""
         return ripples_of(self.nominal, self.recordings)
+
+    @functools.cached_property
+    def slips(self) -> dict[str, float]:
+        """Return when the tracker may have slipped, by recording to fit to (s, its own clock)."""
+        found = {
+            each.name: slip_of(self.nominal, each)
+            for each in self.recordings
+            if each.split == "train"
+        }
+        return {name: at for name, at in found.items() if at is not None}
 
     @property
     def control(self) -> Control:

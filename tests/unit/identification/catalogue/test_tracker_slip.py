@@ -45,16 +45,18 @@ def _tracker(reports: Reports) -> Float64:
 
 @pytest.mark.parametrize("slip_at", [1.5, 4.2])
 def test_a_slip_is_timed_without_simulating(subject: Subject, slip_at: float):
-    assert slip_of(subject, _seen(subject, slip_at, 0.5e-3)) == pytest.approx(slip_at, abs=0.05)
+    assert slip_of(subject.nominal, _seen(subject, slip_at, 0.5e-3)) == pytest.approx(
+        slip_at, abs=0.05
+    )
 
 
 def test_a_slip_is_timed_beside_a_lag_of_the_tracker(subject: Subject):
-    found = slip_of(subject, _seen(subject, 3.3, 0.2e-3, lag=0.015))
+    found = slip_of(subject.nominal, _seen(subject, 3.3, 0.2e-3, lag=0.015))
     assert found == pytest.approx(3.3, abs=0.05)
 
 
 def test_noise_alone_is_no_slip(subject: Subject):
-    assert slip_of(subject, _seen(subject, 100.0, 0.5e-3)) is None
+    assert slip_of(subject.nominal, _seen(subject, 100.0, 0.5e-3)) is None
 
 
 def test_a_slip_is_looked_for_once_in_each_recording_to_fit_to(subject: Subject):
@@ -62,10 +64,10 @@ def test_a_slip_is_looked_for_once_in_each_recording_to_fit_to(subject: Subject)
     later = replace(_seen(subject, 4.0, 0.3e-3), name="fast")
     held_out = replace(slipped, name="other", split="test")
     recordings = (slipped, held_out, later)
-    assert EFFECT.places(replace(subject, recordings=recordings)) == (
-        "slow at 1.995 s",
-        "fast at 3.995 s",
-    )
+    found = replace(subject, recordings=recordings)
+    assert EFFECT.places(found) == ("slow", "fast")
+    times = [EFFECT.quantities(found, place)[3].grid for place in ("slow", "fast")]
+    np.testing.assert_allclose(times, [[1.995], [3.995]])
     assert EFFECT.places(replace(subject, recordings=(smooth,))) == ()
     assert EFFECT.places(replace(subject, recordings=recordings, has_tracker=False)) == ()
 
@@ -73,8 +75,8 @@ def test_a_slip_is_looked_for_once_in_each_recording_to_fit_to(subject: Subject)
 def test_the_tracker_is_off_from_the_slip_on(subject: Subject):
     motion = recorded(_waving, seconds=2.0)
     plain = _tracker(replay(subject, motion))
-    found = _tracker(replay(subject, motion, EFFECT, "slow at 0.995 s", WAY))
-    np.testing.assert_array_equal(found[:100], plain[:100])
+    found = _tracker(replay(subject, motion, EFFECT, "slow", [*WAY, 0.995]))
+    np.testing.assert_allclose(found[:100], plain[:100], atol=1e-12)
     in_hand = rotated(conjugate(plain[100:, 3:]), found[100:, :3] - plain[100:, :3])
     np.testing.assert_allclose(in_hand, np.tile(WAY, (100, 1)), atol=1e-12)
 
@@ -83,15 +85,23 @@ def test_it_stays_off_in_what_is_recorded_later_and_was_right_before(subject: Su
     motion = recorded(_waving, trajectory="third")
     later = replace(motion, earlier=("first", "second"))
     plain = _tracker(replay(subject, motion))
-    moved = _tracker(replay(subject, later, EFFECT, "second at 3.000 s", WAY))
+    moved = _tracker(replay(subject, later, EFFECT, "second", [*WAY, 3.0]))
     assert np.linalg.norm(moved[:, :3] - plain[:, :3], axis=1) == pytest.approx(0.005)
-    before = _tracker(replay(subject, later, EFFECT, "fourth at 3.000 s", WAY))
+    before = _tracker(replay(subject, later, EFFECT, "fourth", [*WAY, 3.0]))
     np.testing.assert_array_equal(before, plain)
+
+
+def test_the_reading_at_the_slip_shares_it(subject: Subject):
+    motion = recorded(_waving, seconds=2.0)
+    plain = _tracker(replay(subject, motion))
+    found = _tracker(replay(subject, motion, EFFECT, "slow", [*WAY, 1.0]))
+    moved = np.linalg.norm(found[:, :3] - plain[:, :3], axis=1)
+    np.testing.assert_allclose(moved[99:102], [0.0, 0.0025, 0.005], atol=1e-9)
 
 
 def test_in_a_part_of_a_recording_the_instant_is_the_recordings(subject: Subject):
     part = replace(recorded(_waving), begin=10.0)
     plain = _tracker(replay(subject, part))
-    found = _tracker(replay(subject, part, EFFECT, "slow at 10.495 s", WAY))
-    np.testing.assert_array_equal(found[:50], plain[:50])
+    found = _tracker(replay(subject, part, EFFECT, "slow", [*WAY, 10.495]))
+    np.testing.assert_allclose(found[:50], plain[:50], atol=1e-12)
     assert np.linalg.norm(found[50:, :3] - plain[50:, :3], axis=1) == pytest.approx(0.005)
