@@ -23,12 +23,12 @@ def _turning(at: Float64) -> Float64:
     return np.stack([0.8 * at, 0.0 * at, 0.0 * at], axis=1)
 
 
-def _command(subject: Subject, period: float, recording: Recorded) -> Signal:
+def _command(subject: Subject, period: float, recording: Recorded, phase: float = 0.0) -> Signal:
     """Return what reaches the controller."""
     seen: list[Signal] = []
 
     def enter(row: Row) -> None:
-        HELD.enter(row, "", np.array([period]))
+        HELD.enter(row, "", np.array([period, phase]))
         seen.append(row.command)
 
     Rollouts(subject.plant, (), 1).run([(enter, recording)])
@@ -49,10 +49,16 @@ def test_an_interval_that_is_no_multiple_takes_the_newest_command(subject: Subje
     np.testing.assert_allclose(taken.values[:4, 0], [0.0, 0.8 * 0.02, 0.8 * 0.05, 0.8 * 0.07])
 
 
+def test_a_late_first_turn_takes_older_commands(subject: Subject):
+    taken = _command(subject, 0.05, recorded(_turning), phase=0.5)
+    np.testing.assert_allclose(taken.at[:4], [0.0, 0.025, 0.075, 0.125])
+    np.testing.assert_allclose(taken.values[:4, 0], [0.0, 0.8 * 0.02, 0.8 * 0.07, 0.8 * 0.12])
+
+
 def test_holding_lags_by_half_an_interval_on_average(subject: Subject):
     ramp = recorded(_turning, seconds=3.0)
     plain = replay(subject, ramp)
-    held = replay(subject, ramp, HELD, "", [0.1])
+    held = replay(subject, ramp, HELD, "", [0.1, 0.0])
     lag = np.mean(plain.q[150:250, 0] - held.q[150:250, 0]) / 0.8
     assert lag == pytest.approx(0.045, abs=0.003)  # (0.1 - 0.01) / 2: commands step by themselves
 
