@@ -25,8 +25,9 @@ class Quantity:
     is_smooth: bool = True
     """Whether small changes of it change the motion a little; else it is searched on a grid."""
     grid: tuple[float, ...] = ()
-    """Of a number that says how, not how much, and means nothing while the others are 0: where to
-    look first. Its probe is only what it is counted in."""
+    """Where to look first. Of a number that says how, not how much, and means nothing while the
+    others are 0: its probe is only what it is counted in. Or of an only number, not smooth, that
+    acts from some size on."""
 
 
 class Effect(Protocol):

@@ -19,6 +19,8 @@ from shared.identification.subject import Subject
 
 GRID = (0.25, 0.5, 1.0, 2.0, 4.0)
 """Sizes, in probes, at which an effect that is not smooth is looked at."""
+_NEAR = 2.0
+"""An effect that acts from some size on is looked at where it does no more than twice too much."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,8 @@ class _Look:
     """The quantities that say how much."""
     values: tuple[Float64, ...]
     """float64[Q] for each of them."""
+    is_level: bool = False
+    """Whether it acts from some size on: what is twice as large is no mixture of it."""
 
 
 def _looks(quantities: Sequence[Quantity]) -> list[_Look]:
@@ -100,18 +104,23 @@ def _looks(quantities: Sequence[Quantity]) -> list[_Look]:
     sizes = tuple(index for index, each in enumerate(quantities) if not each.grid)
     forms = [index for index, each in enumerate(quantities) if each.grid]
     is_smooth = all(quantities[index].is_smooth for index in sizes)
+    scales = (1.0,) if is_smooth else GRID
+    is_level = not sizes
+    if is_level:  # a number that acts from some size on, which its grid is about
+        sizes, forms = (0,), forms[1:]
+        scales = tuple(value / quantities[0].probe for value in quantities[0].grid)
     out: list[_Look] = []
     for grid in itertools.product(*(quantities[index].grid for index in forms)):
         form = np.zeros(len(quantities))
         form[forms] = np.array(grid) / probes[forms]
-        for scale in (1.0,) if is_smooth else GRID:
+        for scale in scales:
             values: list[Float64] = []
             for index in sizes:
                 each = form.copy()
-                each[list(sizes) if not is_smooth else index] = 1.0
+                each[index if is_smooth else list(sizes)] = 1.0
                 each[index] = scale
                 values.append(np.clip(each * probes, low, high))
-            out.append(_Look(scale, form, sizes, tuple(values)))
+            out.append(_Look(scale, form, sizes, tuple(values), is_level))
     return out
 
 
@@ -137,10 +146,12 @@ def _judge(
     high = np.array([each.high / each.probe for each in quantities])
     scale = look.scale
     best: Float64 = np.clip(least_squares(bare, -left) * scale, low, high) / scale
+    if look.is_level:
+        best = np.clip(best, 1.0 / _NEAR, _NEAR)
     explained = bare @ best
     share = float(left @ left - (left + explained) @ (left + explained)) / max(total, 1e-12)
     shift = least_squares(fit.jacobian, -(fit.residual + columns @ best))
     direction = explained / max(float(np.linalg.norm(explained)), 1e-12)
     start = look.form.copy()
-    start[list(look.sizes)] = best * scale
+    start[list(look.sizes)] = scale if look.is_level else best * scale
     return Screened(candidate, start, shift, share, direction)

@@ -59,8 +59,8 @@ class ThermalDerating:
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
         """Return the loss of torque per heat, in units of what the joint's drive does in a run."""
         joint = place_of(subject, place)
-        heat = (0.5 * joint.drive) ** 2 * min(subject.duration, MEMORY)
-        return (Quantity("loss", f"1/(({joint.torque})^2 s)", 0.0, 5.0 / heat, probe=0.3 / heat),)
+        heat = 0.5 * joint.drive**2 * min(subject.duration, MEMORY)
+        return (Quantity("loss", f"1/(({joint.torque})^2 s)", 0.0, 10.0 / heat, probe=0.1 / heat),)
 
     def structure(self, subject: Subject, place: str) -> Structure:
         """Return nothing: it is a torque."""

@@ -7,6 +7,9 @@ from shared.identification.subject import Subject
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure
 
+_LEVELS = (0.5, 0.65, 0.8, 0.95, 1.1, 1.3, 1.6, 2.2, 4.0)
+"""Of the joint's own torque over the limit; a servo that is clipped below what it needs falls."""
+
 
 class TorqueSaturation:
     """A limit of the drive's torque, told by its inverse: 0 is no limit but the model's own."""
@@ -25,10 +28,15 @@ class TorqueSaturation:
         joint = place_of(subject, place)
         return (
             Quantity(
-                "inverse_limit", f"1/({joint.torque})", 0.0, 5.0 / joint.drive,
-                probe=1.4 / joint.drive, is_smooth=False,
+                "inverse_limit",
+                f"1/({joint.torque})",
+                0.0,
+                10.0 / joint.drive,
+                probe=1.2 / joint.drive,
+                is_smooth=False,
+                grid=tuple(level / joint.drive for level in _LEVELS),
             ),
-        )  # fmt: skip
+        )
 
     def structure(self, subject: Subject, place: str) -> Structure:
         """Return nothing: every joint may be limited."""

@@ -8,6 +8,7 @@ import pytest
 from shared.identification.catalogue.joint_spring import EFFECT as SPRING
 from shared.identification.catalogue.stribeck_friction import EFFECT as STRIBECK
 from shared.identification.catalogue.torque_bias import EFFECT as BIAS
+from shared.identification.catalogue.torque_saturation import EFFECT as SATURATION
 from shared.identification.effect import Candidate, Effect
 from shared.identification.fit import polish
 from shared.identification.screen import Screened, screen
@@ -15,11 +16,11 @@ from shared.identification.space import Space
 from shared.sim.plant.row import Row
 from tests.measured import measure, problem_of
 
-_EFFECTS = (SPRING, STRIBECK, BIAS)
+_EFFECTS = (SPRING, STRIBECK, BIAS, SATURATION)
 
 
 def screened(folder: Path, effect: Effect, values: list[float]) -> tuple[Screened, list[float]]:
-    """Return the best of three effects at two joints, and its size in units."""
+    """Return the best of four effects at two joints, and its size in units."""
 
     def enter(row: Row) -> None:
         effect.enter(row, "elbow", np.array(values))
@@ -53,3 +54,9 @@ def test_an_effect_without_a_form_is_looked_at_as_before(tmp_path: Path) -> None
     best, (torque,) = screened(tmp_path, BIAS, [0.5])
     assert best.candidate.label == "torque_bias elbow"
     assert torque == pytest.approx(0.5, rel=0.3)
+
+
+def test_a_limit_is_looked_for_on_its_own_grid(tmp_path: Path) -> None:
+    best, (inverse,) = screened(tmp_path, SATURATION, [0.8])
+    assert best.candidate.label == "torque_saturation elbow"
+    assert inverse == pytest.approx(0.8, rel=0.2)
