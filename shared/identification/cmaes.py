@@ -10,7 +10,7 @@ import numpy as np
 
 from shared.identification.dataset.types import Float64
 
-GENERATIONS = 25
+GENERATIONS = 15
 
 
 def minimize(

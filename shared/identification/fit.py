@@ -50,6 +50,7 @@ def polish(
     segments: tuple[int, ...],
     steps: int = _MAX_STEPS,
     enough: float = _ENOUGH,
+    known: tuple[Float64, Float64] | None = None,
 ) -> Fit:
     """Return a local fit by Levenberg-Marquardt steps within bounds.
 
@@ -62,10 +63,12 @@ def polish(
         segments: recordings to fit to.
         steps: the most derivatives.
         enough: a step that takes off less than this share of the cost is the last one.
+        known: residual and derivative at the start, if they are known.
     """
     z, damping = space.clip(start), 1e-2
     for _ in range(steps):
-        residual, jacobian = space.jacobian(z, segments)
+        residual, jacobian = space.jacobian(z, segments) if known is None else known
+        known = None
         cost = 0.5 * float(residual @ residual)
         dampings = [damping * factor for factor in _DAMPINGS]
         tries = damped(space, z, residual, jacobian, dampings)
@@ -157,8 +160,9 @@ def fit_base(space: Space, rng: np.random.Generator) -> BaseFits:
     parts = Space(problem.windowed(WINDOW), space.candidates)
     origin = np.zeros(space.size)
     pieces = parts.problem.of("train")
-    nominal = Start(origin, parts.jacobian(origin, pieces)[1])
-    begun = polish(parts, origin, pieces, 6)
+    residual, jacobian = parts.jacobian(origin, pieces)
+    nominal = Start(origin, jacobian)
+    begun = polish(parts, origin, pieces, 6, known=(residual, jacobian))
     seed = int(rng.integers(1, 2**31 - 1))
 
     def losses(zs: Float64) -> Float64:

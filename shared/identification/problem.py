@@ -121,6 +121,14 @@ class Problem:
             for reports in self.reports(variants, segments)
         ]
 
+    def size_of(self, segment: int) -> int:
+        """Return how many numbers of :meth:`vector` are a segment's."""
+        of_joints, of_tracker = self._bins[segment]
+        rows, channels = len(of_joints.starts), len(self.noise.joints)
+        if of_tracker is not None and self.noise.tracker is not None:
+            rows, channels = min(rows, len(of_tracker.starts)), channels + len(self.noise.tracker)
+        return rows * channels
+
     def vector(self, variants: Sequence[Variant], segments: Sequence[int]) -> Float64:
         """Return float64[V, M]: the residuals of each variant in one row."""
         return np.stack(

@@ -9,9 +9,11 @@ that remain in the running get a full fit.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shared.identification.dataset.types import Float64
 from shared.identification.fit import Fit, Start, damped
+from shared.identification.problem import Problem
 from shared.identification.screen import Screened
 from shared.identification.space import Space
 
@@ -21,6 +23,8 @@ _DAMPINGS = (0.01, 0.3, 10.0)
 _PARTS = (1.0, 0.5, 0.25)
 """Of the way to where the screen expects the best fit, for a start."""
 _ENOUGH = 0.01
+_EVERY = 2
+"""One in so many parts is enough for a rough look."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +34,8 @@ class Rough:
     screened: Screened
     space: Space
     z: Float64
-    cost: float
-    """Half the sum of squares."""
+    ratio: float
+    """Its cost over the base's, on the recordings that were looked at."""
 
 
 def refit(fit: Fit, nominal: Start, screened: Screened, segments: tuple[int, ...]) -> Rough:
@@ -44,17 +48,33 @@ def refit(fit: Fit, nominal: Start, screened: Screened, segments: tuple[int, ...
         segments: recordings to fit to.
     """
     space = fit.space.grown(screened.candidate)
+    problem = fit.space.problem
+    quantities = screened.candidate.effect.quantities(problem.subject, screened.candidate.place)
+    is_local = not all(quantity.is_smooth for quantity in quantities)
+    picked = segments if is_local else segments[::_EVERY]
+    rows = _rows(problem, segments, picked)
     extra = space.size - fit.space.size
     way = np.r_[screened.shift, screened.start]
     origin = np.r_[fit.z, np.zeros(extra)]
     ways = [space.clip(origin + part * way) for part in _PARTS]
     ways.append(space.clip(np.r_[fit.z, screened.start]))
-    first = _descend(space, ways, fit.jacobian, segments, fit.space.size)
+    first = _descend(space, ways, fit.jacobian[: len(rows)][rows], picked, fit.space.size)
     base = np.r_[nominal.z, fit.z[nominal.z.size :]]
     sizes = [space.clip(np.r_[base, scale * screened.start]) for scale in (1.0, 0.5)]
-    second = _descend(space, sizes, nominal.jacobian, segments, nominal.z.size)
+    second = _descend(space, sizes, nominal.jacobian[: len(rows)][rows], picked, nominal.z.size)
     z, cost = min((first, second), key=lambda found: found[1])
-    return Rough(screened, space, z, cost)
+    before = 0.5 * float(np.sum(fit.residual[: len(rows)][rows] ** 2))
+    return Rough(screened, space, z, cost / max(before, 1e-12))
+
+
+def _rows(
+    problem: Problem, segments: tuple[int, ...], picked: tuple[int, ...]
+) -> NDArray[np.bool_]:
+    """Return which rows of a derivative on segments are of those picked."""
+    wanted = set(picked)
+    return np.concatenate(
+        [np.full(problem.size_of(segment), segment in wanted) for segment in segments]
+    )
 
 
 def _descend(
@@ -68,7 +88,7 @@ def _descend(
     _, own = space.jacobian(z, segments, range(known, space.size))
     rows = len(residual) - space.size
     base = np.zeros((len(residual), known))
-    base[:rows] = kept[:rows, :known]
+    base[:rows] = kept[:, :known]
     base[rows : rows + known] = np.diag(1.0 / space.priors[:known])
     jacobian = np.concatenate([base, own], axis=1)
     damping = 1e-1

@@ -25,6 +25,10 @@ _FULL = 3
 """Of these, candidates that get a full fit."""
 _PER_EFFECT = 3
 """Places of one effect among those tried."""
+_SLIGHT = 0.015
+"""Of the training residual: what explains less at first sight is not refitted."""
+_SLIGHT_BESIDE = 0.1
+"""The same, as a share of what the best one explains."""
 _FAR = 4.0
 """Candidates whose cheap refit costs so many times the best one's get no full fit."""
 QUIET = 1.25
@@ -157,10 +161,10 @@ def _round(
     for index, each in enumerate(picked):
         progress("refit", index / len(picked), each.candidate.label)
         roughly.append(refit(found.parts, found.nominal, each, parts))
-    roughly.sort(key=lambda entry: entry.cost)
+    roughly.sort(key=lambda entry: entry.ratio)
     tried: list[Tried] = []
     for each in roughly[:_FULL]:
-        if each.cost > min(found.parts.cost * (1 - 1e-3), _FAR * roughly[0].cost):
+        if each.ratio > min(1 - 1e-3, _FAR * roughly[0].ratio):
             break
         progress("decide", len(tried) / _FULL, each.screened.candidate.label)
         space = Space(found.problem, each.space.candidates)
@@ -217,7 +221,8 @@ def _diverse(screened: Sequence[Screened]) -> list[Screened]:
     for each in screened:
         name = each.candidate.effect.name
         counts[name] = counts.get(name, 0) + 1
-        if counts[name] <= _PER_EFFECT and each.share > 0.0:
+        is_slight = each.share < max(_SLIGHT, _SLIGHT_BESIDE * screened[0].share)
+        if counts[name] <= _PER_EFFECT and not is_slight:
             out.append(each)
         if len(out) == _TRIED:
             break
