@@ -25,6 +25,10 @@ SLACK = 1.1
 """Noise may be so many times what it was measured to be."""
 UNMEASURED = 1.5
 """The same without repeats, which show only what is faster than the arm."""
+_STRETCH = 25
+"""Blocks in which a correlation is looked at together."""
+_QUIET = 0.4
+"""Share of repeats that noise is learned from, the quietest: a push in one of two is none."""
 _FEWEST = 8
 """Independent windows from which repeats say how wide a statistic is."""
 _GAINS = (2.0, 4.0, 16.0, 64.0, 256.0, 4096.0)
@@ -50,24 +54,25 @@ def width_of(noise: Sequence[Float64], correlation: Float64, is_measured: bool) 
 
     Args:
         noise: float64[B, C] each, in noise floors; differences of repeats over root 2.
-        correlation: float64[C].
+        correlation: float64[C], where ``noise`` is too short to say.
         is_measured: whether there were repeats.
     """
+    correlation = _correlation(noise, correlation)
     slack = SLACK if is_measured else UNMEASURED
     power = np.full((len(POWER_WINDOWS), len(correlation)), slack**2)
     mean = np.full((len(MEAN_WINDOWS), len(correlation)), slack)
-    quartile = NormalDist().inv_cdf(0.875)
+    usual = NormalDist().inv_cdf(0.5 + 0.5 * _QUIET)
     for row, window in enumerate(POWER_WINDOWS):
         if found := _usable(noise, window):
             seen = np.concatenate([_power(each, correlation, window) for each in found])
-            seen = np.quantile(seen, 0.75, axis=0) / _chi_square(0.25, window)
+            seen = np.quantile(seen, _QUIET, axis=0) / _chi_square(1.0 - _QUIET, window)
             power[row] *= np.maximum(seen, 1.0)
         elif row:
             power[row] = power[row - 1]
     for row, window in enumerate(MEAN_WINDOWS):
         if found := _usable(noise, window):
             seen = np.concatenate([np.abs(_mean(each, correlation, window)) for each in found])
-            mean[row] *= np.maximum(np.quantile(seen, 0.75, axis=0) / quartile, 1.0)
+            mean[row] *= np.maximum(np.quantile(seen, _QUIET, axis=0) / usual, 1.0)
         elif row:
             mean[row] = mean[row - 1]
     return Width(correlation, power, mean)
@@ -148,6 +153,25 @@ def _best(scores: Float64) -> tuple[float, int, int]:
     end = int(np.argmax(total - lowest))
     begin = int(np.argmin(total[: end + 1]))
     return float(total[end] - total[begin]), begin, end
+
+
+def _correlation(noise: Sequence[Float64], otherwise: Float64) -> Float64:
+    """Return float64[C], of neighbouring blocks in the quietest stretches."""
+    found = _usable(noise, _STRETCH)
+    if not found:
+        return otherwise
+    pieces = np.stack(
+        [
+            each[begin : begin + _STRETCH]
+            for each in found
+            for begin in range(0, len(each) - _STRETCH + 1, _STRETCH)
+        ]
+    )
+    power = np.sum(pieces**2, axis=1)
+    along = np.sum(pieces[:, 1:] * pieces[:, :-1], axis=1)
+    order = np.argsort(power, axis=0)[: max(round(_QUIET * len(pieces)), 1)]
+    kept = np.take_along_axis(along, order, 0).sum(axis=0)
+    return np.clip(kept / np.take_along_axis(power, order, 0).sum(axis=0), 0.0, 0.99)
 
 
 def _usable(noise: Sequence[Float64], window: int) -> list[Float64]:

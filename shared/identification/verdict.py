@@ -61,12 +61,17 @@ class Unexplained(_Part, frozen=True, kw_only=True):
     end: float
     """(s)."""
     phase: str
-    """In words: ``after reversals``, ``while fast``, ``once``, ``throughout``."""
+    """In words: ``once``, ``after reversals`` (``of the load``), ``while fast``, ``while slow``,
+    ``while loaded``, ``near a posture``, ``grows with time``, ``from a time on``, ``throughout``,
+    ``at times``."""
     size: float
     """Root mean square there."""
     unit: str
     times_noise: float
     """Size in units of the noise floor."""
+    torque: float | None = None
+    """Joint torque that would do the same, root mean square; None behind the encoders."""
+    torque_unit: str = ""
 
 
 class HeldOut(_Part, frozen=True, kw_only=True):
