@@ -29,6 +29,7 @@ JOBS = (
     Command("bench", "jobs.bench", "measure against the limit, in one run"),
     Command("doctor", "jobs.doctor.command", "check this machine and say what to do"),
     Command("styles", "jobs.styles.command", "how protagonists move, and the three to send"),
+    Command("identify", "jobs.identify.command", "what the simulation gets wrong, and why"),
     Command("export", "jobs.export", "a trained policy as ONNX, for other runtimes"),
     Command("sim", "jobs.sim", "export the two-robot model as MJCF"),
     Command("up", "jobs.up", "start and keep alive the processes a site file lists"),

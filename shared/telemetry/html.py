@@ -40,6 +40,12 @@ figure img { border-radius: 10px; }
 .pictures { display: grid; grid-template-columns: 1fr 1fr; gap: 0 18px; }
 .pictures figure:first-child { grid-column: 1 / -1; }
 .pictures figure { margin: .5em 0; }
+.panels { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 400px), 1fr));
+  gap: 8px 28px; }
+.panels figure { margin: .6em 0; max-width: 560px; }
+.beside { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 400px), 1fr));
+  gap: 0 28px; align-items: start; }
+li { max-width: 75ch; margin: .3em 0; }
 .tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(148px, 1fr)); gap: 12px;
   margin: 1.6em 0; }
 .tile { background: var(--card); border: 1px solid var(--line); border-radius: 10px;

@@ -42,7 +42,7 @@ def pr2_dataset(folder: Path) -> Dataset:
     command[:, 2] += 0.10 * np.sin(2 * np.pi * 0.8 * at)
     made = tuple(
         Trajectory(name, split, "", q, np.zeros(7), at, command, at, logged)
-        for name, split in (("swing", "train"), ("swing again", "test"))
+        for name, split in (("swing", "train"), ("swing_again", "test"))
     )
     return Dataset(folder, ModelSource("pr2"), "pose", PR2_JOINTS, POSE, made, (), "ab" * 32)
 
@@ -58,7 +58,7 @@ def pendulum_dataset(folder: Path) -> Dataset:
     q[:, 1] = 0.4 * np.cos(5.0 * at)
     made = tuple(
         Trajectory(name, split, "", q[0], np.zeros(2), at, command, at, q)
-        for name, split in (("shake", "train"), ("shake again", "test"))
+        for name, split in (("shake", "train"), ("shake_again", "test"))
     )
     source = ModelSource("mjcf", path)
     joints = ("shoulder", "elbow")

@@ -1,0 +1,1 @@
+"""`riposte identify`: what a simulation gets wrong, why, and by how much naming it helps."""

@@ -1,0 +1,254 @@
+"""The HTML report of `riposte identify`, from verdict and evidence alone."""
+
+from dataclasses import dataclass
+
+from services.jobs.identify import considered, pictures, words
+from shared.identification.evidence import Evidence
+from shared.identification.model_file import Carried
+from shared.identification.verdict import Cause, Verdict
+from shared.telemetry import html
+from shared.telemetry.html import Html, Node, tag
+
+BENT = (
+    "A base fit that has to stand in for a missing cause bends its parameters: they look "
+    "identified and are wrong. Where a cause was named, those of the extended model are the ones "
+    "to believe; where none was, the two are the same."
+)
+
+
+@dataclass(frozen=True)
+class About:
+    """What the page says of how it was made."""
+
+    name: str
+    """Of the data set."""
+    command: str
+    """That makes the page again."""
+    model_file: str
+    """Name of the extended model's file."""
+    carried: tuple[Carried, ...]
+    """What that file says of each cause."""
+
+
+def report_page(verdict: Verdict, evidence: Evidence, about: About) -> str:
+    """Return the whole page."""
+    return html.page(
+        f"Riposte: what the simulation of {about.name} gets wrong",
+        _head(verdict, evidence, about),
+        _wrong(verdict, evidence),
+        _causes(verdict, evidence),
+        considered.ties(verdict),
+        considered.record_next(verdict),
+        _held_out(verdict, evidence),
+        considered.candidates(verdict),
+        considered.unexplained(verdict, evidence),
+        _diagnostics(evidence),
+        _base(verdict),
+        _model(about),
+        considered.caveats(verdict),
+        considered.again(verdict, about.command),
+    )
+
+
+def _head(verdict: Verdict, evidence: Evidence, about: About) -> Node:
+    train = sum(replay.split == "train" for replay in evidence.replays)
+    counted = f"{train} recordings to fit, {len(evidence.replays) - train} held out"
+    window = pictures.shown_window(verdict, evidence)
+    return [
+        tag("p", f"riposte identify · {about.name} · {counted}", class_="soft"),
+        tag("h1", words.title_text(verdict)),
+        tag("p", verdict.sentence, class_="lead"),
+        None
+        if verdict.starts_agree
+        else tag(
+            "p",
+            tag("b", "Beware: ", class_="bad"),
+            "base fits from different starts did not meet, so believe little of this page.",
+        ),
+        html.tiles(_tiles(verdict)),
+        considered.panels(
+            [pictures.stages(verdict), pictures.left_over(window, verdict, evidence)]
+        ),
+    ]
+
+
+def _tiles(verdict: Verdict) -> list[tuple[Node, Node, str]]:
+    held_out = verdict.held_out
+    tiles: list[tuple[Node, Node, str]] = [
+        (
+            words.quantity_text(cause.value, cause.unit),
+            f"{cause.quantity}: {cause.effect.replace('_', ' ')}, {words.where_text(cause.where)}",
+            "good",
+        )
+        for cause in verdict.causes[:2]
+    ]
+    if verdict.causes:
+        tiles.append((
+            words.share_text(held_out.share_removed),
+            "of the explainable residual on held-out motion is removed",
+            "good",
+        ))  # fmt: skip
+    last = held_out.extended if verdict.causes else held_out.base_fit
+    tiles.append((
+        f"{words.number_text(held_out.nominal)} \N{RIGHTWARDS ARROW} {words.number_text(last)}",
+        "times the noise floor, nominal model to the best",
+        "",
+    ))  # fmt: skip
+    if verdict.ties:
+        count = max(len(tie.causes) for tie in verdict.ties)
+        tiles.append((f"1 of {count}", "causes that these data do not tell apart", "bad"))
+    if verdict.unexplained:
+        largest = max(left.times_noise for left in verdict.unexplained)
+        about = "the noise floor is what the largest unexplained part reaches"
+        tiles.append((f"{words.number_text(largest, 2)}x", about, "bad"))
+    tiles.append((str(len(verdict.candidates)), "candidate causes were looked at", ""))
+    return tiles
+
+
+def _wrong(verdict: Verdict, evidence: Evidence) -> Html:
+    window = pictures.shown_window(verdict, evidence)
+    found = [pictures.motion(window, verdict, evidence), pictures.by_joint(verdict, evidence)]
+    if (tracker := pictures.tracker(window, verdict, evidence)) is not None:
+        found.append(tracker)
+    return html.section("What the simulation gets wrong", considered.panels(found))
+
+
+def _causes(verdict: Verdict, evidence: Evidence) -> Html | None:
+    if not verdict.causes:
+        return None
+    shown = pictures.before_and_after(verdict, evidence)
+    cards = [
+        tag("div", _cause(cause), considered.panels([picture]), class_="beside")
+        for cause, picture in zip(verdict.causes, shown, strict=True)
+    ]
+    title = "The cause" if len(verdict.causes) == 1 else "The causes, largest first"
+    return html.section(title, cards)
+
+
+def _cause(cause: Cause) -> Html:
+    rows: list[tuple[Node, Node]] = [
+        ("effect", tag("code", cause.effect)),
+        ("where", words.where_text(cause.where)),
+        (
+            f"{cause.quantity} (95 %)",
+            tag("b", words.quantity_text(cause.value, cause.unit, cause.interval)),
+        ),
+        *((name, words.number_text(value)) for name, value in cause.others.items()),
+        ("explains by itself", words.share_text(cause.share, cause.share_interval)),
+    ]
+    where = f" at {cause.where}" if cause.where else ""
+    title = cause.title[:1].upper() + cause.title[1:]
+    return tag(
+        "div",
+        tag("h3", f"{title}{where}"),
+        tag("p", f"How it shows: {cause.signature}"),
+        html.table(("", ""), rows),
+    )
+
+
+def _held_out(verdict: Verdict, evidence: Evidence) -> Html:
+    held_out = verdict.held_out
+    stages = (("nominal", "nominal"), ("base_fit", "base fit"), ("extended", "extended"))
+    rows: list[tuple[Node, ...]] = [
+        (
+            name,
+            words.number_text(getattr(held_out, stage)),
+            _of(held_out.joints_mrad, stage),
+            *((_of(held_out.tracker_mm, stage),) if held_out.tracker_mm else ()),
+        )
+        for stage, name in stages
+    ]
+    floor = _of(held_out.joints_mrad, "noise_floor")
+    rows.append((
+        "noise floor",
+        words.number_text(held_out.noise_floor),
+        floor,
+        *((_of(held_out.tracker_mm, "noise_floor"),) if held_out.tracker_mm else ()),
+    ))  # fmt: skip
+    headers = ["stage", "x noise", "joints, mrad"]
+    headers += ["tracker, mm"] if held_out.tracker_mm else []
+    share = words.share_text(held_out.share_removed, held_out.share_interval)
+    caption = (
+        "Root-mean-square residual on trajectories that nothing was fitted to. The extension "
+        f"removes {share} of what lies between base fit and noise floor (95 %)."
+    )
+    if not verdict.causes:
+        caption = "Root-mean-square residual on trajectories that nothing was fitted to."
+    each = [
+        (
+            replay.name,
+            replay.split,
+            *(_of({str(stage): loss for stage, loss in replay.loss.items()}, stage)
+              for stage, _ in stages),
+        )
+        for replay in evidence.replays
+    ]  # fmt: skip
+    return html.section(
+        "Before and after on held-out motion",
+        html.table(headers, rows, numbers=range(1, len(headers)), caption=caption),
+        html.details(
+            "Every trajectory",
+            html.table(
+                ("trajectory", "split", *(name for _, name in stages)), each, numbers=(2, 3, 4),
+                caption="Residual in units of the noise floor.",
+            ),
+        ),
+    )  # fmt: skip
+
+
+def _of(values: dict[str, float], key: str) -> str:
+    return words.number_text(values[key]) if key in values else "-"
+
+
+def _diagnostics(evidence: Evidence) -> Html:
+    about = (
+        "How the residual of the base fit looks, before any cause was looked for; measured minus "
+        "predicted, over all recordings. Nothing was decided here: it is for people who know the "
+        "arm."
+    )
+    return html.section(
+        "Diagnostics", tag("p", about), considered.panels(pictures.diagnostics(evidence))
+    )  # fmt: skip
+
+
+def _base(verdict: Verdict) -> Html | None:
+    if not verdict.base:
+        return None
+    picture = pictures.base(verdict)
+    rows = [
+        (
+            row.name,
+            row.unit,
+            *(words.number_text(value) for value in (row.nominal, row.base_fit, row.extended)),
+            f"{words.number_text(row.interval.low)} to {words.number_text(row.interval.high)}",
+        )
+        for row in verdict.base
+    ]
+    headers = ("parameter", "unit", "nominal", "base fit", "extended", "95 % of extended")
+    return html.section(
+        "Base parameters",
+        tag("div", considered.panels([picture]), tag("p", BENT), class_="beside")
+        if picture is not None
+        else None,
+        html.details(
+            f"All {len(rows)} parameters", html.table(headers, rows, numbers=(2, 3, 4, 5))
+        ),
+    )
+
+
+def _model(about: About) -> Html:
+    rows = [
+        (
+            f"{one.effect} {one.where}".strip(),
+            tag("span", "in the file" if one.is_carried else "not in it",
+                class_="good" if one.is_carried else "bad"),
+            one.sentence,
+        )
+        for one in about.carried
+    ]  # fmt: skip
+    return html.section(
+        "The extended model",
+        tag("p", tag("code", about.model_file), " beside this page has the base parameters as "
+            "they were fitted", ", and of each cause:" if rows else "; there is no cause to add."),
+        html.table(("cause", "", "how"), rows) if rows else None,
+    )  # fmt: skip

@@ -1,0 +1,138 @@
+"""A verdict in words: numbers with units, and the lines that `riposte identify` ends with."""
+
+import textwrap
+from pathlib import Path
+
+from shared.identification.verdict import Cause, HeldOut, Interval, Tie, Unexplained, Verdict
+
+WIDTH = 88
+TITLES = {
+    "named": "A cause was found",
+    "none": "Nothing to name",
+    "tie": "One of several causes",
+    "base_too_coarse": "The base model is too coarse",
+    "unexplained": "Something is left that has no name",
+}
+"""Of each verdict."""
+_SMALLER = {"s": "ms", "m": "mm", "rad": "mrad"}
+"""Units whose thousandths have a name of their own."""
+MINUS = "\N{MINUS SIGN}"
+
+
+def title_text(verdict: Verdict) -> str:
+    """Return what came out, in a few words."""
+    if len(verdict.causes) > 1:
+        return f"{len(verdict.causes)} causes were found"
+    return TITLES[verdict.verdict]
+
+
+def number_text(value: float, digits: int = 3) -> str:
+    """Return a number with some significant digits and a proper minus, without powers of ten."""
+    if value != value:
+        return "not known"
+    text = f"{value:.{digits}g}"
+    if "e" in text and 1e-6 < abs(value) < 1e7:
+        decimals = max(0, digits - 1 - int(text.partition("e")[2]))
+        text = f"{value:,.{decimals}f}"
+    return text.replace("-", MINUS)
+
+
+def _scaled(unit: str, *values: float) -> tuple[str, float]:
+    """Return a unit that fits the largest of values, and what to multiply them by."""
+    largest = max((abs(value) for value in values), default=0.0)
+    if unit in _SMALLER and 0.0 < largest < 0.1:
+        return _SMALLER[unit], 1e3
+    return ("" if unit == "1" else unit), 1.0
+
+
+def quantity_text(value: float, unit: str, interval: Interval | None = None) -> str:
+    """Return a quantity and its 95 % interval: ``30 ms (29.8 to 30.2)``."""
+    ends = () if interval is None else (interval.low, interval.high)
+    shown, factor = _scaled(unit, value, *ends)
+    text = f"{number_text(factor * value)} {shown}".strip()
+    if interval is None:
+        return text
+    low, high = (number_text(factor * end) for end in ends)
+    return f"{text} ({low} to {high})"
+
+
+def where_text(where: str) -> str:
+    """Return a place for people; names of joints are as they are in the data."""
+    return where or "the whole arm"
+
+
+def cause_text(cause: Cause) -> str:
+    """Return a cause in a line: what, where, how large, how sure."""
+    where = f" at {cause.where}" if cause.where else ""
+    size = quantity_text(cause.value, cause.unit, cause.interval)
+    return f"{cause.title}{where}: {cause.quantity} {size}"
+
+
+def share_text(share: float, interval: Interval | None = None) -> str:
+    """Return a share in percent, with its interval."""
+    text = f"{100.0 * share:.0f} %".replace("-", MINUS)
+    if interval is None:
+        return text
+    low, high = (f"{100.0 * end:.0f}".replace("-", MINUS) for end in (interval.low, interval.high))
+    return f"{text} ({low} to {high})"
+
+
+def held_out_text(held_out: HeldOut) -> str:
+    """Return how far off each stage is on motion that nothing was fitted to."""
+    text = (
+        f"{number_text(held_out.nominal)} nominal, {number_text(held_out.base_fit)} with base "
+        f"parameters fitted, {number_text(held_out.extended)} extended; 1 is the noise floor"
+    )
+    if held_out.tracker_mm:
+        ends = [held_out.tracker_mm.get(stage) for stage in ("base_fit", "extended")]
+        if ends[0] is not None and ends[1] is not None:
+            text += f" (tracker {number_text(ends[0])} to {number_text(ends[1])} mm)"
+    return text
+
+
+def tie_text(tie: Tie) -> str:
+    """Return a tie in a line."""
+    names = " or ".join(
+        f"{cause.title}{f' at {cause.where}' if cause.where else ''}" for cause in tie.causes
+    )
+    return f"{names}: alike to {number_text(tie.alike)}"
+
+
+def unexplained_text(left: Unexplained) -> str:
+    """Return in a line where something is left."""
+    size = quantity_text(left.size, left.unit)
+    return (
+        f"{left.where}, {left.trajectory} from {number_text(left.begin)} to "
+        f"{number_text(left.end)} s, {left.phase}: {size}, "
+        f"{number_text(left.times_noise)} times the noise"
+    )
+
+
+def unexplained_mark(number: int) -> str:
+    """Return the letter of the nth place where something is left: A, B, ... Z, 27, 28."""
+    return chr(ord("A") + number) if number < 26 else str(number + 1)
+
+
+def verdict_text(verdict: Verdict, folder: Path) -> str:
+    """Return a verdict on one screen."""
+    lines = ["", *textwrap.wrap(verdict.sentence, WIDTH), ""]
+
+    def add(name: str, texts: list[str]) -> None:
+        for index, text in enumerate(texts):
+            first = f"{name if index == 0 else '':<12}"
+            lines.extend(
+                textwrap.wrap(text, WIDTH, initial_indent=first, subsequent_indent=" " * 12)
+            )
+
+    add("cause", [cause_text(cause) for cause in verdict.causes])
+    add("either", [tie_text(tie) for tie in verdict.ties])
+    add("held out", [held_out_text(verdict.held_out)])
+    if verdict.causes:
+        share = share_text(verdict.held_out.share_removed, verdict.held_out.share_interval)
+        add("", [f"removes {share} of what could be explained"])
+    add("unexplained", [unexplained_text(left) for left in verdict.unexplained[:3]])
+    add("record next", list(verdict.record_next[:3]))
+    if not verdict.starts_agree:
+        add("beware", ["base fits from different starts did not meet: believe little of this"])
+    add("report", [str(folder / "report.html")])
+    return "\n".join(lines)

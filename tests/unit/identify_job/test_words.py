@@ -1,0 +1,72 @@
+"""Numbers with units, and the lines at the end."""
+
+from pathlib import Path
+
+import pytest
+
+from services.jobs.identify.words import (
+    number_text,
+    quantity_text,
+    share_text,
+    unexplained_mark,
+    verdict_text,
+)
+from shared.identification.verdict import Interval
+from tests.unit.identify_job.examples import WORDS, example
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.0304, "s", "30.4 ms"),
+        (0.3, "s", "0.3 s"),
+        (-0.0021, "m", "\N{MINUS SIGN}2.1 mm"),
+        (0.05, "rad", "50 mrad"),
+        (0.612, "N m", "0.612 N m"),
+        (0.25, "1", "0.25"),
+        (0.00012, "kg m^2", "0.00012 kg m^2"),
+        (0.0, "s", "0 s"),
+    ],
+)
+def test_a_quantity_is_written_in_a_unit_that_fits(value: float, unit: str, text: str) -> None:
+    assert quantity_text(value, unit) == text
+
+
+def test_an_interval_has_the_unit_of_its_value() -> None:
+    ends = Interval(low=0.09, high=0.12)
+    assert quantity_text(0.099, "s", ends) == "0.099 s (0.09 to 0.12)"
+    assert quantity_text(0.02, "s", Interval(low=-0.001, high=0.04)) == (
+        "20 ms (\N{MINUS SIGN}1 to 40)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(1234567.0, "1,234,567"), (0.00001234, "0.0000123"), (float("nan"), "not known"), (7.0, "7")],
+)
+def test_numbers_have_no_powers_of_ten(value: float, text: str) -> None:
+    assert number_text(value) == text
+
+
+def test_shares_are_in_percent() -> None:
+    assert share_text(0.987, Interval(low=0.95, high=1.0)) == "99 % (95 to 100)"
+    assert share_text(-0.02) == "\N{MINUS SIGN}2 %"
+
+
+def test_places_have_letters_then_numbers() -> None:
+    assert [unexplained_mark(k) for k in (0, 25, 26)] == ["A", "Z", "27"]
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_the_last_lines_say_the_verdict_and_where_the_report_is(word: str) -> None:
+    verdict = example(word).verdict  # pyright: ignore[reportArgumentType]
+    text = verdict_text(verdict, Path("out"))
+    flat = " ".join(text.split())
+    assert verdict.sentence in flat
+    assert "out/report.html" in flat
+    assert flat.count("beware") == (not verdict.starts_agree)
+    for cause in verdict.causes:
+        assert quantity_text(cause.value, cause.unit, cause.interval) in flat
+    for sentence in verdict.record_next:
+        assert sentence in flat
+    assert max(len(line) for line in text.splitlines()) <= 88
