@@ -22,10 +22,11 @@ from shared.identification.verdict import (
     Word,
 )
 
-ENOUGH_REMOVED = 0.8
-"""Share of the explainable held-out residual that named causes must take off together."""
 NEARLY_NOISE = 1.4
 """Mean square residual below which nothing worth a name is left."""
+MAY_BE_LEFT = 0.05
+"""Share of the base fit's mean square residual that named causes may leave where that is more:
+what is far larger than the noise is never modelled to the last digit."""
 FAR_FROM_KNOWN = 3.0
 """Standard deviations from what is known of a link at which the base itself is doubted."""
 
@@ -53,7 +54,7 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
     held_out = _held_out(found)
     causes = _causes(found)
     ties = _ties(found, causes)
-    word = _word(found, held_out, ties)
+    word = _word(found, ties)
     return Conclusion(
         word=word,
         sentence=_sentence(word, causes, ties, held_out, left),
@@ -70,10 +71,10 @@ def extended(found: Search) -> Variant:
     return found.current.space.variant(found.current.z)
 
 
-def _word(found: Search, held_out: HeldOut, ties: tuple[Tie, ...]) -> Word:
+def _word(found: Search, ties: tuple[Tie, ...]) -> Word:
     base, left = float(found.base_losses.mean()), float(found.current_losses.mean())
     if found.accepted:
-        if left > NEARLY_NOISE and held_out.share_removed < ENOUGH_REMOVED:
+        if left > max(NEARLY_NOISE, MAY_BE_LEFT * base):
             return "unexplained"
         return "tie" if ties else "named"
     if base <= NEARLY_NOISE:
@@ -306,6 +307,12 @@ def _sentence(
         return (
             f"The base model does not fit: {ratio} are left with links far from their known mass. "
             "Release more of its parameters, or correct the model file, before looking for causes."
+        )
+    if causes:
+        names = " and ".join(f"{_label(cause)} ({_size(cause)})" for cause in causes)
+        return (
+            f"Something is wrong that no effect of the catalogue explains. Nearest comes {names}, "
+            f"but from {ratio} it leaves {held_out.extended:.2f}, which is too much to believe it."
         )
     place = f", most of it at {left[0].where} {left[0].phase}" if left else ""
     return f"Something is wrong that no effect of the catalogue explains: {ratio}{place}."
