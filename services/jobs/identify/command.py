@@ -15,15 +15,17 @@ from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
-from shared.identification.find import identify
 
 from services.jobs.identify.outputs import Made, write_all
 from services.jobs.identify.progress import StepDisplay
 from services.jobs.identify.words import verdict_text
 from shared.clock import SystemClock
+from shared.config.site import nearest
 from shared.errors import ConfigError
+from shared.identification.catalogue import effects
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.dataset.types import Dataset, ModelSource
+from shared.identification.find import identify
 from shared.runtime.files import RunLock, require_free_space
 
 FREE_BYTES = 64 << 20
@@ -54,6 +56,7 @@ def main(argv: Sequence[str]) -> int:
     if argv and argv[0] in _BY_NAME:
         return _subcommand(_BY_NAME[argv[0]], argv[1:])
     found = _parse(argv)
+    _check_effects(found.without)
     dataset = _dataset(found.dataset, found.model)
     out = _out_folder(found.dataset, found.out)
     display = StepDisplay(SystemClock())
@@ -134,6 +137,18 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
     if not 0 <= found.seed <= LARGEST_SEED:
         raise ConfigError(f"--seed is {found.seed}; allowed are 0 to {LARGEST_SEED}")
     return found
+
+
+def _check_effects(names: Sequence[str]) -> None:
+    """Check that the catalogue has effects of these names.
+
+    Raises:
+        ConfigError: it has not; names the nearest.
+    """
+    known = [effect.name for effect in effects()]
+    for name in names:
+        if name not in known:
+            raise ConfigError(f"--without {name}: there is no such effect; {nearest(name, known)}")
 
 
 def _dataset(folder: Path, model: Path | None) -> Dataset:

@@ -68,7 +68,7 @@ def test_a_subcommand_is_told_from_a_folder_of_its_name(
 def test_a_hidden_effect_is_found_and_everything_is_left_behind(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["identify", "simulate", str(tmp_path / "set"), "--arm", "pendulum", "--seed", "3"]
+    words = ["identify", "simulate", str(tmp_path / "set"), "--arm", "torque2", "--seed", "3"]
     assert main([*words, "--effect", "coulomb_friction"]) == 0
     capsys.readouterr()
     assert main(["identify", str(tmp_path / "set"), "--json"]) == 0
