@@ -21,7 +21,7 @@ MEAN_WINDOWS = (5, 25, 100, 250)
 """Blocks."""
 ALARM = 0.01
 """Probability that noise alone shows anything."""
-SLACK = 1.1
+SLACK = 1.15
 """Noise may be so many times what it was measured to be."""
 UNMEASURED = 1.5
 """The same without repeats, which show only what is faster than the arm."""
