@@ -54,7 +54,7 @@ def segments_of(
         if window is None:
             found.append(_part(index, trajectory, 0.0, np.inf, None))
         else:
-            found += _windows(index, trajectory, window)
+            found += _windows(index, trajectory, window, subject)
     names = tuple(each.name for each in dataset.trajectories)
     return tuple(
         replace(each, recorded=replace(each.recorded, earlier=names[: each.trajectory]))
@@ -62,7 +62,7 @@ def segments_of(
     )
 
 
-def _windows(index: int, trajectory: Trajectory, window: float) -> list[Segment]:
+def _windows(index: int, trajectory: Trajectory, window: float, subject: Subject) -> list[Segment]:
     at = trajectory.joints_at
     period = float(np.median(np.diff(at)))
     even = np.arange(at[0], at[-1], period)
@@ -73,10 +73,10 @@ def _windows(index: int, trajectory: Trajectory, window: float) -> list[Segment]
     position = smooth(q, width)
     speed = smooth(q, width, period)
     starts = np.arange(at[0] + width * period, at[-1] - 0.5 * window, window)
-    states = [
-        (sampled(even, position, np.array([start]))[0], sampled(even, speed, np.array([start]))[0])
-        for start in starts
-    ]
+    # MuJoCo's Euler step takes the position with the speed after it: it is of second order if the
+    # speed is given half a step before the position (Stormer and Verlet's method).
+    before = starts - 0.5 * subject.plant.timestep
+    states = list(zip(sampled(even, position, starts), sampled(even, speed, before), strict=True))
     return [
         _part(index, trajectory, float(start), float(start) + window, state)
         for start, state in zip(starts, states, strict=True)
