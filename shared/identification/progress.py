@@ -3,7 +3,7 @@
 from typing import Literal, Protocol, get_args
 
 Step = Literal[
-    "noise floor", "base fit", "diagnostics", "screen", "refit", "decide", "unexplained"
+    "noise floor", "base fit", "screen", "refit", "decide", "unexplained", "diagnostics"
 ]  # fmt: skip
 """Of the method, in the order in which they are done."""
 STEPS: tuple[Step, ...] = get_args(Step)
