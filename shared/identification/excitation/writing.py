@@ -1,0 +1,163 @@
+"""Writes a programme: a data set that lacks only what the robot will log."""
+
+# pyright: basic
+# (pyarrow's types are partial)
+
+import contextlib
+import os
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import tomli_w
+
+from shared.errors import IdentificationError
+from shared.identification.dataset.manifest import FILE, SCHEMA
+from shared.identification.dataset.tables import TIME
+from shared.identification.dataset.types import Trajectory
+from shared.identification.excitation.prediction import Prediction
+from shared.identification.excitation.programme import SHOWS, Programme
+from shared.runtime.files import atomic_write, sync_folder
+
+PROGRAMME_FILE: Final = "programme.toml"
+PICTURE_FILE: Final = "programme.png"
+COMMAND_FILE: Final = "command.parquet"
+_NANO: Final = 1_000_000_000
+
+
+def write_programme(
+    programme: Programme,
+    prediction: Prediction,
+    folder: Path,
+    generator: Mapping[str, Any],
+    picture: bytes,
+) -> None:
+    """Write a programme: ``NAME/command.parquet`` each, the manifests and the picture.
+
+    With ``joints.parquet``, and ``tracker.parquet`` where there is a tracker, put beside each
+    ``command.parquet``, the folder is a data set.
+
+    Args:
+        programme: the motions.
+        prediction: what they will show.
+        folder: the new folder; must not exist, or be empty.
+        generator: who wrote it and how, for people; TOML values.
+        picture: PNG of it all.
+
+    Raises:
+        IdentificationError: the folder is not empty, or cannot be written.
+    """
+    folder = folder.absolute()
+    temporary = folder.with_name(f".{folder.name}.{os.getpid()}.tmp")
+    try:
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise IdentificationError(f"{folder} is already there: name a new folder")
+        temporary.mkdir(parents=True)
+        for each in programme.predicted.trajectories:
+            (temporary / each.name).mkdir()
+            table = _table(each, programme.predicted.actuators)
+            atomic_write(temporary / each.name / COMMAND_FILE, table)
+        atomic_write(temporary / PICTURE_FILE, picture)
+        made = tomli_w.dumps(_programme(programme, prediction, generator))
+        atomic_write(temporary / PROGRAMME_FILE, made.encode())
+        manifest = tomli_w.dumps(_manifest(programme, folder, generator))
+        atomic_write(temporary / FILE, manifest.encode())
+        os.replace(temporary, folder)
+        sync_folder(folder.parent)
+    except OSError as error:
+        raise IdentificationError(f"cannot write {folder}: {error.strerror or error}") from error
+    finally:
+        with contextlib.suppress(OSError):
+            shutil.rmtree(temporary)
+
+
+def _table(each: Trajectory, columns: tuple[str, ...]) -> bytes:
+    arrays = {TIME: pa.array(np.round(each.command_at * _NANO).astype(np.int64))}
+    for name, values in zip(columns, each.command.T, strict=True):
+        arrays[name] = pa.array(np.ascontiguousarray(values))
+    sink = pa.BufferOutputStream()
+    pq.write_table(pa.table(arrays), sink, compression="zstd", write_page_checksum=True)
+    return sink.getvalue().to_pybytes()
+
+
+def _manifest(programme: Programme, folder: Path, generator: Mapping[str, Any]) -> dict[str, Any]:
+    dataset = programme.predicted
+    source = dataset.source
+    model: dict[str, Any] = {"kind": source.kind}
+    if source.kind == "pr2":
+        model["arm"] = source.arm
+    for key, path in (("path", source.path), ("parameters", source.parameters)):
+        if path is not None:
+            model[key] = os.path.relpath(path.absolute(), folder)
+    if source.tracked:
+        model["tracked"] = source.tracked
+    entries: list[dict[str, Any]] = []
+    for each in dataset.trajectories:
+        entry: dict[str, Any] = {"name": each.name, "split": each.split}
+        if each.repeats:
+            entry["repeats"] = each.repeats
+        entries.append(entry)
+    return {
+        "schema": SCHEMA,
+        "control": dataset.control,
+        "model": model,
+        "generator": dict(generator),
+        "trajectory": entries,
+    }
+
+
+def _programme(
+    programme: Programme, prediction: Prediction, generator: Mapping[str, Any]
+) -> dict[str, Any]:
+    joints = programme.predicted.joints
+    return {
+        "generator": dict(generator),
+        "seconds": round(programme.seconds, 3),
+        "home": dict(zip(joints, programme.arm.home.tolist(), strict=True)),
+        "share_visible": round(prediction.share, 4),
+        "recording": [
+            {
+                "name": part.plan.name,
+                "split": part.plan.split,
+                "repeats": part.plan.repeats,
+                "shows": SHOWS[part.plan.kind],
+                "seconds": round(float(part.at[-1]), 3),
+                "lead_m": round(float(lead[0]), 4),
+                "lead_rad": round(float(lead[1]), 4),
+                "effort_share": {
+                    name: round(float(share), 3) for name, share in zip(joints, effort, strict=True)
+                },
+            }
+            for part, effort, lead in zip(
+                programme.parts, programme.effort, programme.lead, strict=True
+            )
+        ],
+        "effect": [
+            {
+                "name": outlook.effect,
+                "visible": outlook.is_visible,
+                "places": [
+                    {
+                        "place": power.place,
+                        "size": power.size,
+                        "unit": power.unit,
+                        "signal_to_noise": round(power.ratio, 3),
+                    }
+                    for power in outlook.powers
+                ],
+            }
+            for outlook in prediction.outlooks
+        ],
+        "alike": [
+            {
+                "first": pair.first.label,
+                "second": pair.second.label,
+                "cosine": round(pair.cosine, 4),
+            }
+            for pair in prediction.pairs
+        ],
+    }
