@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 
 from shared.identification.dataset.types import Float64
 from shared.identification.noise import repeat_differences
-from shared.identification.phases import AT_TIMES, FROM_THEN, ONCE, Look, Phase, phase_of
+from shared.identification.phases import (
+    AT_TIMES,
+    FROM_THEN,
+    ONCE,
+    Look,
+    Phase,
+    phase_of,
+    push_of,
+)
 from shared.identification.places import moving, place_of
 from shared.identification.problem import BLOCK, Problem, Variant
 from shared.identification.scan import Width, merged, scan, stretches, width_of
@@ -192,16 +200,25 @@ def _told(
     ]
     moves = [problem.subject.joints.index(each.label) for each in moving(problem.subject)]
     phase = phase_of(looks, [group.joint] if group.joint is not None else moves)
+    torques = _torques(tracks, group, missing)
+    pushes = [
+        push_of(torques[index], piece)
+        for index, pieces in group.pieces.items()
+        if index in torques
+        for piece in merged(pieces, _GAP)
+    ]
+    if len(pushes) == 1 and pushes[0] is not None:
+        phase = Phase(ONCE)  # where friction holds, the arm stays off when the push is over
     words = _words(problem, phase, group)
     found: list[tuple[float, Unexplained]] = []
-    for track, look in zip(tracks, looks, strict=True):
+    for index, (track, look) in enumerate(zip(tracks, looks, strict=True)):
         if not look.pieces:
             continue
         alone = phase.words in (ONCE, AT_TIMES)
         for pieces in ([piece] for piece in look.pieces) if alone else [list(look.pieces)]:
             there = pieces
-            if phase.words == ONCE and missing is not None and group.joint is not None:
-                there = [_acted(missing.of(track)[:, group.joint], piece) for piece in pieces]
+            if phase.words == ONCE and index in torques:
+                there = [push_of(torques[index], piece) or piece for piece in pieces]
             entry = _entry(problem, track, group, there, words, missing)
             if entry.times_noise >= LEAST_SIZE:
                 blocks = sum(piece.stop - piece.start for piece in pieces)
@@ -209,11 +226,13 @@ def _told(
     return found
 
 
-def _acted(torque: Float64, piece: slice) -> slice:
-    """Return when the missing torque was there: an arm is still off when a push is over."""
-    size: Float64 = np.abs(torque[piece])
-    high = np.flatnonzero(size >= 0.5 * float(np.quantile(size, 0.9)))
-    return slice(piece.start + int(high[0]), piece.start + int(high[-1]) + 1)
+def _torques(
+    tracks: Sequence[Track], group: _Group, missing: _Missing | None
+) -> dict[int, Float64]:
+    """Return float64[B], the torque that is missing at a group's joint, by track."""
+    if missing is None or group.joint is None:
+        return {}
+    return {index: missing.of(tracks[index])[:, group.joint] for index in group.pieces}
 
 
 def _channels(tracks: Sequence[Track], group: _Group) -> NDArray[np.int64]:

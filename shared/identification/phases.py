@@ -20,6 +20,10 @@ _SHORTEST = 0.5
 """Of what is there from a time on, and of what was before (s)."""
 _STAYS = 0.7
 """Share of the time after it began in which it has to be there."""
+_LATE = 5
+"""Blocks by which an arm is off after what pushes it, and that torques are smeared over."""
+_MOSTLY = 0.7
+"""Share of a missing torque's energy from which it was a push."""
 _MANY = 0.8
 """Share of the time from which something is there throughout."""
 _FEW = 0.05
@@ -100,6 +104,25 @@ def phase_of(looks: Sequence[Look], joints: Sequence[int]) -> Phase:
     if len(pieces) <= 3 and max(lengths, default=0.0) <= _LONGEST_EVENT:
         return Phase(ONCE)
     return Phase(THROUGHOUT if hot.mean() > 0.5 else AT_TIMES)
+
+
+def push_of(torque: Float64, piece: slice) -> slice | None:
+    """Return when in a stretch a torque was missing; None if it was not only for a short while.
+
+    An arm is still off when what pushed it is over, so that motion says less about when.
+
+    Args:
+        torque: float64[B] (N m, N), smooth over five blocks or so.
+        piece: blocks in which the arm is off.
+    """
+    begin = max(piece.start - _LATE, 0)
+    size: Float64 = np.abs(torque[begin : piece.stop])
+    high = np.flatnonzero(size >= 0.5 * float(np.sort(size)[-min(5, len(size))]))
+    first, last = int(high[0]), int(high[-1]) + 1
+    inside = size[max(first - _LATE, 0) : last + _LATE]
+    is_all = float(np.sum(inside**2)) >= _MOSTLY * float(np.sum(size**2))
+    is_short = BLOCK * (last - first) <= _LONGEST_EVENT
+    return slice(begin + first, begin + last) if is_all and is_short else None
 
 
 def _is_from_then(looks: Sequence[Look]) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shared.identification.dataset.types import Float64
-from shared.identification.phases import Look, phase_of
+from shared.identification.phases import Look, phase_of, push_of
 
 AT = 0.02 * np.arange(500) + 0.01
 Q = np.sin(2.0 * np.pi * 0.3 * AT)
@@ -56,3 +56,15 @@ def test_power_that_rises_over_recordings_grows_with_time() -> None:
         return Look(AT, begins, power, whole.pieces, whole.q, whole.qd, whole.effort, whole.load)
 
     assert phase_of([rising(0.0), rising(10.0), rising(20.0)], [0]).words == "grows with time"
+
+
+def test_a_push_is_over_when_its_torque_is_though_the_arm_stays_off() -> None:
+    torque = 0.05 * np.random.default_rng(2).standard_normal(500)
+    torque[100:120] -= 1.0
+    assert push_of(torque, slice(103, 500)) == slice(100, 120)
+
+
+def test_a_torque_that_stays_is_no_push() -> None:
+    torque = 0.05 * np.random.default_rng(2).standard_normal(500)
+    torque[100:] -= 1.0
+    assert push_of(torque, slice(103, 500)) is None
