@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shared.identification.base import INERTIA_PRIOR
 from shared.identification.certainty import half_widths
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
@@ -24,11 +23,11 @@ from shared.identification.verdict import (
 
 NEARLY_NOISE = 1.4
 """Mean square residual below which nothing worth a name is left."""
+STANDS_OUT = 5.0
+"""Size of a stretch, in noise floors, that is not passed over whatever the mean residual is."""
 MAY_BE_LEFT = 0.05
 """Share of the base fit's mean square residual that named causes may leave where that is more:
 what is far larger than the noise is never modelled to the last digit."""
-FAR_FROM_KNOWN = 3.0
-"""Standard deviations from what is known of a link at which the base itself is doubted."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,7 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
     held_out = _held_out(found)
     causes = _causes(found)
     ties = _ties(found, causes)
-    word = _word(found, ties)
+    word = _word(found, ties, left)
     return Conclusion(
         word=word,
         sentence=_sentence(word, causes, ties, held_out, left),
@@ -71,19 +70,20 @@ def extended(found: Search) -> Variant:
     return found.current.space.variant(found.current.z)
 
 
-def _word(found: Search, ties: tuple[Tie, ...]) -> Word:
+def _word(found: Search, ties: tuple[Tie, ...], left_over: tuple[Unexplained, ...]) -> Word:
     base, left = float(found.base_losses.mean()), float(found.current_losses.mean())
     if found.accepted:
         if left > max(NEARLY_NOISE, MAY_BE_LEFT * base):
             return "unexplained"
         return "tie" if ties else "named"
-    if base <= NEARLY_NOISE:
+    if base <= NEARLY_NOISE and not _stands_out(left_over):
         return "none"
-    priors = [abs(z) for z, each in zip(found.base.z, found.problem.parameters, strict=True)
-              if each.prior == INERTIA_PRIOR]  # fmt: skip
-    if max(priors, default=0.0) > FAR_FROM_KNOWN * INERTIA_PRIOR:
-        return "base_too_coarse"
-    return "unexplained"
+    return "base_too_coarse" if found.doubted else "unexplained"
+
+
+def _stands_out(left: tuple[Unexplained, ...]) -> bool:
+    """Return whether something that happened is too large to pass over."""
+    return any(each.times_noise > STANDS_OUT for each in left)
 
 
 def _held_out(found: Search) -> HeldOut:

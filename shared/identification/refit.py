@@ -20,6 +20,8 @@ from shared.identification.space import Space
 _ITERATIONS = 6
 _DAMPINGS = (0.01, 0.3, 10.0)
 """Factors of Marquardt's damping that are tried at once."""
+_MENDING = (1e-4, 1e-2, 1.0)
+"""Dampings of the last step of a rough refit."""
 _PARTS = (1.0, 0.5, 0.25)
 """Of the way to where the screen expects the best fit, for a start."""
 _ENOUGH = 0.01
@@ -56,15 +58,32 @@ def refit(fit: Fit, nominal: Start, screened: Screened, segments: tuple[int, ...
     extra = space.size - fit.space.size
     way = np.r_[screened.shift, screened.start]
     origin = np.r_[fit.z, np.zeros(extra)]
-    ways = [space.clip(origin + part * way) for part in _PARTS]
+    forms = [False] * fit.space.size + [bool(each.grid) for each in quantities]
+    is_form: NDArray[np.bool_] = np.array(forms)
+    ways: list[Float64] = []
+    for part in _PARTS:
+        there: Float64 = np.where(is_form, way, origin + part * way)
+        ways.append(space.clip(there))
     ways.append(space.clip(np.r_[fit.z, screened.start]))
     first = _descend(space, ways, fit.jacobian[: len(rows)][rows], picked, fit.space.size)
     base = np.r_[nominal.z, fit.z[nominal.z.size :]]
-    sizes = [space.clip(np.r_[base, scale * screened.start]) for scale in (1.0, 0.5)]
+    half = np.where(is_form[-extra:], screened.start, 0.5 * screened.start)
+    sizes = [space.clip(np.r_[base, size]) for size in (screened.start, half)]
     second = _descend(space, sizes, nominal.jacobian[: len(rows)][rows], picked, nominal.z.size)
-    z, cost = min((first, second), key=lambda found: found[1])
+    z, cost = _mended(space, *min((first, second), key=lambda found: found[1]), picked)
     before = 0.5 * float(np.sum(fit.residual[: len(rows)][rows] ** 2))
     return Rough(screened, space, z, cost / max(before, 1e-12))
+
+
+def _mended(
+    space: Space, z: Float64, cost: float, segments: tuple[int, ...]
+) -> tuple[Float64, float]:
+    """Return what one step with a derivative of its own comes to."""
+    residual, jacobian = space.jacobian(z, segments)
+    tries = damped(space, z, residual, jacobian, list(_MENDING))
+    costs = 0.5 * np.sum(space.residual(tries, segments) ** 2, axis=1)
+    best = int(np.argmin(costs))
+    return (tries[best], float(costs[best])) if costs[best] < cost else (z, cost)
 
 
 def _rows(

@@ -10,7 +10,7 @@ from shared.identification.search import Search
 from shared.runtime.files import atomic_write
 
 FILE = "base_fit.json"
-SCHEMA = 1
+SCHEMA = 2
 
 
 class _Saved(msgspec.Struct, frozen=True, kw_only=True):
@@ -19,7 +19,7 @@ class _Saved(msgspec.Struct, frozen=True, kw_only=True):
     """SHA-256."""
     model: str
     seed: int
-    parameters: int
+    parameters: list[str]
     parts: list[float]
     whole: list[float]
     starts_agree: bool
@@ -31,7 +31,7 @@ def save(folder: Path, dataset: Dataset, seed: int, found: Search) -> None:
         dataset=dataset.hash,
         model=repr(dataset.source),
         seed=seed,
-        parameters=len(found.problem.parameters),
+        parameters=[each.name for each in found.problem.parameters],
         parts=found.parts.z.tolist(),
         whole=found.base.z.tolist(),
         starts_agree=found.base.starts_agree,
@@ -48,6 +48,8 @@ def load(folder: Path, dataset: Dataset, seed: int) -> SavedFits | None:
     same = (kept.schema, kept.dataset, kept.model, kept.seed)
     if same != (SCHEMA, dataset.hash, repr(dataset.source), seed):
         return None
-    if not len(kept.parts) == len(kept.whole) == kept.parameters:
+    if not len(kept.parts) == len(kept.whole) == len(kept.parameters):
         return None
-    return SavedFits(tuple(kept.parts), tuple(kept.whole), kept.starts_agree)
+    return SavedFits(
+        tuple(kept.parameters), tuple(kept.parts), tuple(kept.whole), kept.starts_agree
+    )

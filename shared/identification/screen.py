@@ -13,7 +13,7 @@ import numpy as np
 
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate, Effect, Quantity
-from shared.identification.fit import Fit, least_squares
+from shared.identification.fit import Fit, bounded, least_squares
 from shared.identification.problem import Variant
 from shared.identification.subject import Subject
 
@@ -145,7 +145,7 @@ def _judge(
     low = np.array([each.low / each.probe for each in quantities])
     high = np.array([each.high / each.probe for each in quantities])
     scale = look.scale
-    best: Float64 = np.clip(least_squares(bare, -left) * scale, low, high) / scale
+    best = bounded(bare, -left, low / scale, np.maximum(high, low + 1e-9) / scale)
     if look.is_level:
         best = np.clip(best, 1.0 / _NEAR, _NEAR)
     explained = bare @ best

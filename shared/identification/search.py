@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from shared.identification.base import base_parameters
+from shared.identification.base import INERTIA_PRIOR, BaseParameter, base_parameters
 from shared.identification.dataset.types import Dataset, Float64
 from shared.identification.effect import Candidate, Effect
 from shared.identification.fit import Fit, SavedFits, Start, fit_again, fit_base, polish
@@ -21,7 +21,7 @@ from shared.identification.subject import subject_of
 MOST_CAUSES = 4
 _TRIED = 8
 """Candidates that are refitted with the base's derivative kept."""
-_FULL = 3
+_FULL = 5
 """Of these, candidates that get a full fit."""
 _PER_EFFECT = 3
 """Places of one effect among those tried."""
@@ -29,10 +29,17 @@ _SLIGHT = 0.015
 """Of the training residual: what explains less at first sight is not refitted."""
 _SLIGHT_BESIDE = 0.1
 """The same, as a share of what the best one explains."""
-_FAR = 4.0
-"""Candidates whose cheap refit costs so many times the best one's get no full fit."""
+_FAR = 2.0
+"""Candidates whose rough refit costs so many times the best one's get no full fit."""
 QUIET = 1.25
 """Mean square residual, in noise floors, below which no further cause is looked for."""
+FAR_FROM_KNOWN = 3.0
+"""Standard deviations from what is known of a link at which the base itself is doubted."""
+_ONCE = "external_contact"
+_STANDS_OUT = 8.0
+"""Mean square residual of a stretch over the usual one, where something happened once."""
+_TAKEN_AWAY = 0.4
+"""Share of it that may be left by what explains it."""
 ALIKE = 0.02
 """Of a cause's gain: what does as well within this is not told from it."""
 
@@ -46,6 +53,8 @@ class Tried:
     gain: Gain
     losses: Float64
     """float64[S] of held-out stretches."""
+    is_event: bool = False
+    """Whether it happened once, in a recording that was fitted to, and explains what stood out."""
 
     @property
     def candidate(self) -> Candidate:
@@ -66,6 +75,8 @@ class Search:
     rng: np.random.Generator
     candidates: tuple[Candidate, ...]
     ruled_out: dict[str, str]
+    doubted: tuple[str, ...]
+    """Parameters that were taken out of the base because they went further than is believable."""
     base: Fit
     """Without any cause, on whole recordings."""
     nominal: Start
@@ -111,10 +122,21 @@ def begin(
     progress("noise floor", 0.0)
     subject = subject_of(dataset)
     noise = noise_of(dataset, BLOCK)
-    problem = Problem(subject, dataset, base_parameters(subject), noise)
-    progress("base fit", 0.0, f"{len(problem.parameters)} parameters")
+    known = base_parameters(subject)
+    if fits is not None:
+        known = tuple(each for each in known if each.name in fits.names)
+    problem = Problem(subject, dataset, known, noise)
+    progress("base fit", 0.0, f"{len(known)} parameters")
     space = Space(problem)
     done = fit_base(space, rng) if fits is None else fit_again(space, fits)
+    if doubted := _doubted(done.whole):
+        # What is known of a link does not hold, so the base may not bend it: what is wrong there
+        # is looked for like any other cause.
+        progress("base fit", 0.5, f"without {', '.join(each.name for each in doubted)}")
+        kept = tuple(each for each in known if each not in doubted)
+        problem = Problem(subject, dataset, kept, noise)
+        space = Space(problem)
+        done = fit_base(space, rng)
     test = problem.of("test")
     nominal = stretches(problem, space.variant(np.zeros(space.size)), test)
     losses = stretches(problem, space.variant(done.whole.z), test)
@@ -124,6 +146,11 @@ def begin(
         rng=rng,
         candidates=candidates,
         ruled_out=ruled_out,
+        doubted=tuple(
+            each.name
+            for each in base_parameters(subject)
+            if each.name not in {other.name for other in problem.parameters}
+        ),
         base=done.whole,
         nominal=done.nominal,
         parts=done.parts,
@@ -132,6 +159,15 @@ def begin(
         base_losses=losses,
         current_losses=losses,
     )
+
+
+def _doubted(fit: Fit) -> list[BaseParameter]:
+    """Return the parameters that a fit bends further than what is known of them allows."""
+    return [
+        each
+        for each, z in zip(fit.space.problem.parameters, fit.z, strict=False)
+        if each.prior == INERTIA_PRIOR and abs(z) > FAR_FROM_KNOWN * INERTIA_PRIOR
+    ]
 
 
 def search(found: Search, progress: Progress) -> None:
@@ -164,26 +200,28 @@ def _round(
     roughly.sort(key=lambda entry: entry.ratio)
     tried: list[Tried] = []
     for each in roughly[:_FULL]:
-        if each.ratio > min(1 - 1e-3, _FAR * roughly[0].ratio):
+        if each.ratio > min(1 - 1e-3, _FAR * roughly[0].ratio + 0.02):
             break
         progress("decide", len(tried) / _FULL, each.screened.candidate.label)
         space = Space(found.problem, each.space.candidates)
         fit = polish(space, each.z, train, 4)
         losses = stretches(found.problem, space.variant(fit.z), test)
         gain = compare(found.current_losses, losses, found.rng)
-        tried.append(Tried(each.screened, fit, gain, losses))
+        is_event = _explains_event(found, each.screened.candidate, fit, train)
+        tried.append(Tried(each.screened, fit, gain, losses, is_event))
     for one in tried:
         found.tried.setdefault(one.candidate.label, one)
     base = float(found.base_losses.mean())
-    useful = [one for one in tried if one.gain.is_useful(base)]
+    useful = [one for one in tried if one.is_event or one.gain.is_useful(base)]
     if not useful:
         return False
     best, rivals = _simplest(useful, found.rng)
+    rivals = tuple(one for one in rivals if not _adds(found, best, one, train, test))
     fit = polish(best.fit.space, best.fit.z, train, 6, enough=1e-4)
     losses = stretches(found.problem, fit.space.variant(fit.z), test)
     gain = compare(found.current_losses, losses, found.rng)
     if gain.loss <= best.gain.loss:
-        best = Tried(best.screened, fit, gain, losses)
+        best = Tried(best.screened, fit, gain, losses, best.is_event)
     found.accepted.append(best)
     found.rivals.append(rivals)
     found.current, found.current_losses = best.fit, best.losses
@@ -192,6 +230,26 @@ def _round(
     space = Space(found.parts.space.problem, best.fit.space.candidates)
     found.parts = polish(space, best.fit.z, parts, 3)
     return True
+
+
+def _explains_event(found: Search, candidate: Candidate, fit: Fit, train: tuple[int, ...]) -> bool:
+    """Return whether a cause that is in one recording takes away what stands out there.
+
+    Held-out recordings cannot show what happened once in another one. What stands out must be far
+    over everything else, more than noise that is the same throughout would ever be.
+    """
+    if candidate.effect.name != _ONCE:
+        return False
+    problem = found.problem
+    before = stretches(problem, found.current.space.variant(found.current.z), train)
+    after = stretches(problem, fit.space.variant(fit.z), train)
+    worst = int(np.argmax(before - after))
+    usual = max(float(np.median(before)), 1.0)
+    return bool(
+        before[worst] > _STANDS_OUT * usual
+        and after[worst] < _TAKEN_AWAY * before[worst]
+        and after.max() < max(_TAKEN_AWAY * before.max(), _STANDS_OUT * usual)
+    )
 
 
 def _simplest(useful: list[Tried], rng: np.random.Generator) -> tuple[Tried, tuple[Tried, ...]]:
@@ -214,6 +272,22 @@ def _is_alike(best: Tried, other: Tried, rng: np.random.Generator) -> bool:
     return margin.gain < max(margin.error, ALIKE * best.gain.gain)
 
 
+def _adds(
+    found: Search, best: Tried, other: Tried, train: tuple[int, ...], test: tuple[int, ...]
+) -> bool:
+    """Return whether a rival is a cause beside the best: together they do surely better.
+
+    Two joints of one chain that both rub: friction of either imitates most of the other's.
+    """
+    space = best.fit.space.grown(other.candidate)
+    size = other.numbers
+    starts = [np.r_[best.fit.z, share * other.fit.z[-size:]] for share in (0.5, 0.1)]
+    fits = [polish(space, space.clip(start), train, 4) for start in starts]
+    fit = min(fits, key=lambda one: one.cost)
+    losses = stretches(found.problem, space.variant(fit.z), test)
+    return compare(best.losses, losses, found.rng).is_useful(float(found.base_losses.mean()))
+
+
 def _diverse(screened: Sequence[Screened]) -> list[Screened]:
     """Return the best few, not all of one effect."""
     counts: dict[str, int] = {}
@@ -232,7 +306,7 @@ def _diverse(screened: Sequence[Screened]) -> list[Screened]:
 def _prune(found: Search, train: tuple[int, ...], test: tuple[int, ...]) -> None:
     """Take back causes without which the rest does as well."""
     base = float(found.base_losses.mean())
-    for each in list(found.accepted[:-1]):
+    for each in [one for one in found.accepted[:-1] if not one.is_event]:
         kept = [other for other in found.accepted if other is not each]
         space = Space(found.problem, tuple(other.candidate for other in kept))
         full = found.current.space
