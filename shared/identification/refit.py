@@ -56,13 +56,14 @@ def refit(fit: Fit, nominal: Start, screened: Screened, segments: tuple[int, ...
     picked = segments if is_local else segments[::_EVERY]
     rows = _rows(problem, segments, picked)
     extra = space.size - fit.space.size
-    way = np.r_[screened.shift, screened.start]
-    origin = np.r_[fit.z, np.zeros(extra)]
+    way: Float64 = np.concatenate([screened.shift, screened.start])
+    origin: Float64 = np.concatenate([fit.z, np.zeros(extra)])
     forms = [False] * fit.space.size + [bool(each.grid) for each in quantities]
     is_form: NDArray[np.bool_] = np.array(forms)
     ways: list[Float64] = []
     for part in _PARTS:
-        there: Float64 = np.where(is_form, way, origin + part * way)
+        there = origin + part * way
+        there[is_form] = way[is_form]
         ways.append(space.clip(there))
     ways.append(space.clip(np.r_[fit.z, screened.start]))
     first = _descend(space, ways, fit.jacobian[: len(rows)][rows], picked, fit.space.size)
