@@ -1,10 +1,8 @@
 """Fits a space to recordings: CMA-ES as in the paper, then least squares from several starts."""
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from shared.identification.cmaes import minimize
 from shared.identification.dataset.types import Float64
@@ -39,25 +37,6 @@ class Fit:
     def covariance(self) -> Float64:
         """Return float64[n, n], of z, for a noise of 1 (what correlates is widened elsewhere)."""
         return np.asarray(np.linalg.pinv(self.jacobian.T @ self.jacobian), np.float64)
-
-
-def least_squares(columns: Float64, wanted: Float64) -> Float64:
-    """Return float64[k]: the shares of columns that come nearest to what is wanted."""
-    return np.asarray(np.linalg.lstsq(columns, wanted, rcond=1e-8)[0], np.float64)
-
-
-def bounded(columns: Float64, wanted: Float64, low: Float64, high: Float64) -> Float64:
-    """Return float64[k]: the shares of columns within bounds that come nearest to what is wanted.
-
-    Args:
-        columns: float64[M, k].
-        wanted: float64[M].
-        low: float64[k], below ``high``.
-        high: float64[k].
-    """
-    q, r = np.linalg.qr(columns)
-    found: Any = lsq_linear(r, q.T @ wanted, (low, high))  # its types are partial
-    return np.asarray(found.x, np.float64)
 
 
 def polish(

@@ -13,7 +13,8 @@ import numpy as np
 
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate, Effect, Quantity
-from shared.identification.fit import Fit, bounded, least_squares
+from shared.identification.fit import Fit
+from shared.identification.linear import bounded, least_squares
 from shared.identification.problem import Variant
 from shared.identification.subject import Subject
 
