@@ -25,7 +25,9 @@ NEARLY_NOISE = 1.4
 """Mean square residual below which nothing worth a name is left."""
 STANDS_OUT = 5.0
 """Size of a stretch, in noise floors, that is not passed over whatever the mean residual is."""
-MAY_BE_LEFT = 0.05
+BESIDE_A_NAME = 1.7
+"""The same beside a cause that passed."""
+MAY_BE_LEFT = 0.08
 """Share of the base fit's mean square residual that named causes may leave where that is more:
 what is far larger than the noise is never modelled to the last digit."""
 
@@ -73,7 +75,7 @@ def extended(found: Search) -> Variant:
 def _word(found: Search, ties: tuple[Tie, ...], left_over: tuple[Unexplained, ...]) -> Word:
     base, left = float(found.base_losses.mean()), float(found.current_losses.mean())
     if found.accepted:
-        if left > max(NEARLY_NOISE, MAY_BE_LEFT * base):
+        if left > max(BESIDE_A_NAME, MAY_BE_LEFT * base):
             return "unexplained"
         return "tie" if ties else "named"
     if base <= NEARLY_NOISE and not _stands_out(left_over):
