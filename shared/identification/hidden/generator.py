@@ -85,7 +85,7 @@ def _described(chosen: Chosen) -> HiddenEffect:
     hidden, case = chosen.hidden, chosen.case
     return HiddenEffect(
         name=hidden.name,
-        where=hidden.where(case),
+        where=case.place,
         quantities=tuple(
             HiddenQuantity(name=name, value=float(value), unit=unit)
             for name, (value, unit) in hidden.values(case).items()

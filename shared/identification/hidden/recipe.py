@@ -40,6 +40,8 @@ class Recipe:
     """A person moves the arm slowly, where motion is designed otherwise."""
     has_tracker: bool = True
     seed: int = 0
+    reach: float = 1.0
+    """How far motion goes, as a share of what the arm may; a small one shows one posture only."""
     seconds: float = 6.0
     train: int = 3
     test: int = 2
@@ -54,6 +56,7 @@ class Recipe:
         """Refuse what cannot be made."""
         for name, value, low, high in (
             ("seconds", self.seconds, 2.0, 600.0),
+            ("reach", self.reach, 0.01, 1.0),
             ("train trajectories", self.train, 1, 30),
             ("test trajectories", self.test, 1, 30),
             ("random effects", self.random, 0, 5),

@@ -43,7 +43,7 @@ def plans(recipe: Recipe, arm: HiddenArm, rng: np.random.Generator) -> tuple[Pla
     for split, kind, programme in asked:
         seen[kind] = seen.get(kind, 0) + 1
         name = kind if seen[kind] == 1 else f"{kind}_{seen[kind]}"
-        q = arm.rest + programme(arm, at, rng)
+        q = arm.rest + recipe.reach * programme(arm, at, rng)
         command = Signal(at, commands_for(arm, at, q))
         found.append(_plan(recipe, name, split, "", command, rng))
         if len(found) == 1:

@@ -88,8 +88,6 @@ class Hidden:
     """Returns what it is in the catalogue's numbers."""
     enter: Callable[[Robot, Case], None]
     """Puts it into a robot that is not yet compiled."""
-    where: Callable[[Case], str] = lambda case: case.place
-    """Returns the place as the catalogue would say it, where that depends on the shape."""
 
 
 @cache

@@ -33,6 +33,9 @@ def _enter(robot: Robot, case: Case) -> None:
         mujoco.mju_rotVecQuat(axis, np.eye(3)[index], inverse)
         made = base.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
         made.armature = 0.05
+    # What stands still may have no mass, what moves must.
+    robot.spec.compiler.boundmass = max(float(robot.spec.compiler.boundmass), 1e-6)
+    robot.spec.compiler.boundinertia = max(float(robot.spec.compiler.boundinertia), 1e-9)
     _stand_still(robot)
     robot.laws.append(lambda: _spring(1.0 / _parts(case)))
     robot.trust_encoders()

@@ -1,4 +1,4 @@
-"""Commands are lost while the link is down, and so are readings: each packet by itself."""
+"""Readings and commands are lost while the link is down; the size is how long."""
 
 import numpy as np
 
@@ -15,29 +15,28 @@ def _outages(case: Case) -> list[tuple[float, float]]:
     rng = np.random.default_rng((1e6 * case.shape).astype(np.int64))
     count = int(case.scene.duration / _EVERY) - 1
     begins = 0.5 * _EVERY + _EVERY * (np.arange(count) + rng.uniform(0.0, 0.7, count))
-    return [(float(begin), float(begin + rng.uniform(0.08, 0.25))) for begin in begins]
+    lengths = case.size * rng.uniform(0.7, 1.3, count)
+    return list(zip(begins.tolist(), (begins + lengths).tolist(), strict=True))
 
 
 def _enter(robot: Robot, case: Case) -> None:
     outages = _outages(case)
     robot.outages += outages
-    rng = np.random.default_rng((1e6 * case.shape).astype(np.int64) + 1)
 
     def lose(command: Signal) -> Signal:
         down = np.zeros(len(command.at), np.bool_)
         for begin, end in outages:
             down |= (command.at >= begin) & (command.at < end)
-        lost = down & (rng.uniform(size=len(down)) < case.size)
-        return Signal(command.at[~lost], command.values[~lost])
+        return Signal(command.at[~down], command.values[~down])
 
     robot.commands.append(lose)
 
 
 HIDDEN = Hidden(
     name="dropped_packets",
-    way="each packet is lost or not",
+    way="packets that are not there",
     places=whole_arm,
-    sizes=lambda scene, place: (0.3, 1.0),
-    values=lambda case: {"share": (case.size, "1")},
+    sizes=lambda scene, place: (0.06, 0.3),
+    values=lambda case: {"share": (1.0, "1")},
     enter=_enter,
 )

@@ -13,12 +13,12 @@ def _enter(robot: Robot, case: Case) -> None:
 
 
 def _latch(case: Case) -> Callable[[float, Float64], Float64]:
-    phase = float(case.shape[0])
+    late = float(case.shape[0])
     turn, held = -math.inf, None
 
     def hold(time: float, wanted: Float64) -> Float64:
         nonlocal turn, held
-        now = math.floor(time / case.size + phase + 1e-9)
+        now = math.floor(time / case.size - late + 1e-9)
         if now != turn or held is None:
             turn, held = now, wanted
         return held
@@ -31,6 +31,6 @@ HIDDEN = Hidden(
     way="a latch in the loop, which begins to count at any time",
     places=whole_arm,
     sizes=lambda scene, place: (0.012, 0.15),
-    values=lambda case: {"period": (case.size, "s")},
+    values=lambda case: {"period": (case.size, "s"), "phase": (float(case.shape[0]), "1")},
     enter=_enter,
 )

@@ -48,9 +48,11 @@ HIDDEN = Hidden(
     places=_places,
     sizes=lambda scene, place: (5e-4, 0.03),
     values=lambda case: {
-        axis: (float(part), "m")
-        for axis, part in zip("xyz", case.size * direction(case.shape), strict=True)
+        **{
+            axis: (float(part), "m")
+            for axis, part in zip("xyz", case.size * direction(case.shape), strict=True)
+        },
+        "time": (_instant(case) + 0.5 * _SOFT, "s"),
     },
     enter=_enter,
-    where=lambda case: f"{case.place} at {_instant(case) + 0.5 * _SOFT:.3f} s",
 )

@@ -1,0 +1,1 @@
+"""What the benchmark of identification is made of."""

@@ -1,0 +1,17 @@
+"""The paper: a base fit, and nothing is named."""
+
+from typing import Any
+
+from shared.identification.gate import floor_of
+from shared.identification.search import Search
+
+
+def base_only(found: Search) -> dict[str, Any]:
+    """Return what the base fit is worth: it is what the others' shares are measured against."""
+    return {"name": "", "share_removed": 0.0, "loss": float(found.base_losses.mean())}
+
+
+def share_removed(found: Search, loss: float) -> float:
+    """Return the share of the explainable held-out loss that a model with a loss removes."""
+    base = float(found.base_losses.mean())
+    return (base - loss) / (base - floor_of(base))

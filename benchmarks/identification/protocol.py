@@ -1,0 +1,123 @@
+"""Which data sets are made: every effect by itself, none, two, one that is not looked for, ties.
+
+Seeds begin at 20 000; those below 10 000 are for development.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from shared.identification.hidden.recipe import Recipe, Wish
+from shared.sim.hidden.arms import ARMS, ArmName
+from shared.sim.hidden.effect import Scene, hidden_effects
+
+FIRST_SEED = 20_000
+PER_EFFECT = 20
+NULLS = 100
+PAIRS = 60
+OUTSIDE = 40
+TIES = 20
+Cell = Literal["single", "null", "null_imperfect", "two", "outside", "tie"]
+_ARMS: tuple[ArmName, ...] = ("pr2", "arm3")
+"""By turns; effects that neither can have go to ``torque2``."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One data set, and what the finder may not look for."""
+
+    cell: Cell
+    recipe: Recipe
+    without: frozenset[str] = frozenset()
+
+    @property
+    def key(self) -> str:
+        """Return its name, the same in every run."""
+        names = "+".join(wish.name for wish in self.recipe.wishes) or str(self.recipe.random)
+        return f"{self.cell}/{names}/{self.recipe.arm}/{self.recipe.seed}"
+
+
+def protocol(share: float = 1.0) -> tuple[Trial, ...]:
+    """Return the trials of all cells, those of a cell by turns.
+
+    Args:
+        share: of the numbers in the protocol; at least one of each.
+    """
+
+    def some(count: int) -> int:
+        return max(1, round(share * count))
+
+    found = [
+        *_single(some(PER_EFFECT)),
+        *_nulls("null", some(NULLS), is_imperfect=False),
+        *_nulls("null_imperfect", some(NULLS), is_imperfect=True),
+        *_two(some(PAIRS)),
+        *_outside(some(OUTSIDE)),
+        *_ties(some(TIES)),
+    ]
+    return tuple(found)
+
+
+def smoke() -> tuple[Trial, ...]:
+    """Return a hidden effect and none, in recordings as short as can be."""
+    small = {"arm": "torque2", "seconds": 2.5, "train": 2, "test": 1}
+    return (
+        Trial("single", Recipe(**small, seed=FIRST_SEED, wishes=(Wish("payload", None, 0.3),))),
+        Trial("null", Recipe(**small, seed=FIRST_SEED + 1)),
+    )
+
+
+def arms_of(name: str) -> tuple[ArmName, ...]:
+    """Return the arms that an effect is hidden in."""
+    able = tuple(arm for arm in ARMS if hidden_effects()[name].places(_scene(arm)))
+    return tuple(arm for arm in _ARMS if arm in able) or able
+
+
+def _scene(arm: ArmName) -> Scene:
+    return Scene(ARMS[arm], ("a", "a_again", "b"), ("a", "a_again", "b"), 6.0)
+
+
+def _single(count: int) -> Iterator[Trial]:
+    for number, name in enumerate(hidden_effects()):
+        arms = arms_of(name)
+        for turn in range(count):
+            seed = FIRST_SEED + 100 * number + turn
+            arm = arms[turn % len(arms)]
+            yield Trial("single", Recipe(arm=arm, seed=seed, wishes=(Wish(name),)))
+
+
+def _nulls(cell: Cell, count: int, *, is_imperfect: bool) -> Iterator[Trial]:
+    first = FIRST_SEED + (11_000 if is_imperfect else 10_000)
+    for turn in range(count):
+        arm = _ARMS[turn % len(_ARMS)]
+        yield Trial(cell, Recipe(arm=arm, seed=first + turn, is_imperfect=is_imperfect))
+
+
+def _two(count: int) -> Iterator[Trial]:
+    for turn in range(count):
+        arm = _ARMS[turn % len(_ARMS)]
+        recipe = Recipe(arm=arm, seed=FIRST_SEED + 12_000 + turn, random=2, shares=(0.3, 0.95))
+        yield Trial("two", recipe)
+
+
+def _outside(count: int) -> Iterator[Trial]:
+    names = tuple(hidden_effects())
+    for turn in range(count):
+        name = names[turn % len(names)]
+        arms = arms_of(name)
+        arm = arms[turn // len(names) % len(arms)]
+        seed = FIRST_SEED + 13_000 + turn
+        recipe = Recipe(arm=arm, seed=seed, wishes=(Wish(name),), shares=(0.5, 0.95))
+        yield Trial("outside", recipe, frozenset({name}))
+
+
+def _ties(count: int) -> Iterator[Trial]:
+    """Return two causes near one posture, where they are the same torque."""
+    for turn in range(count):
+        name = ("torque_bias", "counterbalance")[turn % 2]
+        place = ("shoulder", "elbow")[turn // 2 % 2]
+        recipe = Recipe(
+            arm="arm3", seed=FIRST_SEED + 14_000 + turn, reach=0.04, shares=(0.8, 0.95),
+            wishes=(Wish(name, place),),
+        )  # fmt: skip
+        yield Trial("tie", recipe)

@@ -1,0 +1,99 @@
+"""Runs trials over processes; each finished one is a line of a file: a second call goes on."""
+
+import json
+import multiprocessing
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.identification.baselines import baselines
+from benchmarks.identification.judging import record_of
+from benchmarks.identification.protocol import Trial
+from shared.errors import RiposteError
+from shared.identification.find import identify
+from shared.identification.hidden.generator import hide
+from shared.identification.hidden.truth import read_truth
+from shared.runtime.build import commit
+from shared.runtime.process import THREAD_LIMITS
+
+PROCESSES = 2
+
+
+def finished(path: Path) -> list[dict[str, Any]]:
+    """Return the records that a file has; a line cut off by a crash does not count."""
+    if not path.exists():
+        return []
+    found: dict[str, dict[str, Any]] = {}
+    for line in path.read_text(encoding="utf-8").splitlines():
+        try:
+            record = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        found[record["key"]] = record
+    return list(found.values())
+
+
+def run(
+    trials: Sequence[Trial], path: Path, baselines_every: int, processes: int = PROCESSES
+) -> list[dict[str, Any]]:
+    """Return the records of all trials, those done before included.
+
+    Args:
+        trials: what is to be done.
+        path: of the file, JSON lines.
+        baselines_every: on every so many data sets the baselines run, too; 0: on none.
+        processes: how many at once.
+    """
+    done = {record["key"] for record in finished(path)}
+    left = [
+        (trial, bool(baselines_every) and number % baselines_every == 0)
+        for number, trial in enumerate(trials)
+        if trial.key not in done
+    ]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    os.environ.update(THREAD_LIMITS)
+    context = multiprocessing.get_context("spawn")
+    with path.open("a", encoding="utf-8") as file, context.Pool(processes) as pool:
+        for number, record in enumerate(pool.imap_unordered(one, left), 1):
+            file.write(json.dumps(record) + "\n")
+            file.flush()
+            print(f"{number}/{len(left)} {record['key']}: {_said(record)}", file=sys.stderr)
+    wanted = {trial.key for trial in trials}
+    return [record for record in finished(path) if record["key"] in wanted]
+
+
+def one(job: tuple[Trial, bool]) -> dict[str, Any]:
+    """Make a data set, let the finder look at it, and return the record."""
+    trial, with_baselines = job
+    with tempfile.TemporaryDirectory() as folder:
+        data, steps = Path(folder) / "data", Path(folder) / "steps"
+        steps.mkdir()
+        try:
+            dataset = hide(data, trial.recipe)
+            truth = read_truth(data)
+            begin = time.process_time()
+            finding = identify(
+                dataset,
+                seed=trial.recipe.seed,
+                resume_folder=steps,
+                without=tuple(sorted(trial.without)),
+            )
+            cpu_s = time.process_time() - begin
+        except RiposteError as error:
+            return {"key": trial.key, "cell": trial.cell, "error": str(error), "commit": commit()}
+        record = record_of(trial, truth, finding.verdict, cpu_s)
+        record["commit"] = commit()
+        if with_baselines:
+            record["baselines"] = baselines(dataset, trial.recipe.seed, steps)
+    return record
+
+
+def _said(record: dict[str, Any]) -> str:
+    if "error" in record:
+        return f"error: {record['error']}"
+    names = [f"{each['name']} {each['where']}".strip() for each in record["named"]]
+    return f"{record['verdict']} {', '.join(names)} ({record['cpu_s']:.0f} CPU s)"

@@ -1,0 +1,168 @@
+"""What all records say together: rates with intervals, errors, and who was taken for whom."""
+
+import itertools
+import math
+from collections import Counter, defaultdict
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from benchmarks.identification.judging import Judged, judged
+from services.jobs.bench import Check
+
+_Z = 1.96
+SEEN = (0.02, 0.1, 0.3, 0.6, 0.8, 1.0)
+"""Edges of the curve over how much of the residual an effect makes."""
+
+
+def wilson(hits: int, count: int) -> tuple[float, float]:
+    """Return the 95 % interval of a rate (Wilson 1927)."""
+    if not count:
+        return 0.0, 1.0
+    rate, spread = hits / count, _Z**2 / count
+    middle = (rate + spread / 2) / (1 + spread)
+    half = _Z * math.sqrt(rate * (1 - rate) / count + spread / (4 * count)) / (1 + spread)
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def checks_of(records: Sequence[dict[str, Any]]) -> tuple[Check, ...]:
+    """Return every figure that has a target, those of cells that were run; the main one first."""
+    done = [record for record in records if "error" not in record]
+    cells: dict[str, list[Judged]] = defaultdict(list)
+    for record in done:
+        cells[record["cell"]].append(judged(record))
+    single = cells["single"]
+    named = [each for each in single if each.has_place]
+    errors = [error for each in named for error in each.errors]
+    covered = [hit for each in named for hit in each.covered]
+    removed = [
+        record["share_removed"]
+        for record in done
+        if record["cell"] == "single" and judged(record).has_effect
+    ]
+    found = [
+        _rate("right effect", single, lambda each: each.has_effect, 0.90),
+        _rate("effect and place", single, lambda each: each.has_place, 0.85),
+        _rate("named or in the tie", single, lambda each: each.has_tie, 0.98),
+        _rate("a false name beside it", single, lambda each: each.false_names > 0, None),
+        _rate("false names, base right", cells["null"], _is_false, 0.05, "at most"),
+        _rate("false names, base imperfect", cells["null_imperfect"], _is_false, 0.10, "at most"),
+        _rate("both of two", cells["two"], lambda each: each.has_effect, 0.80),
+        _rate("at least one of two", cells["two"], lambda each: each.has_one, 0.97),
+        _rate("a third name beside two", cells["two"], _is_false, 0.05, "at most"),
+        _rate("outside: a wrong name", cells["outside"], _is_false, 0.10, "at most"),
+        _rate("structural tie reported", cells["tie"], lambda each: each.is_tied, 1.0),
+    ]
+    outside = [record for record in done if record["cell"] == "outside"]
+    raised = sum(bool(record["unexplained"]) or not record["named"] for record in outside)
+    found.append(_share("outside: unexplained raised", raised, len(outside), 0.90))
+    if errors:
+        found.append(_at_most("error of the size, median", float(np.median(errors)), 0.05))
+        found.append(
+            _at_most("error of the size, 90th percentile", float(np.quantile(errors, 0.9)), 0.20)
+        )
+        found.append(_share("95 % intervals cover", sum(covered), len(covered), 0.90))
+    if removed:
+        found.append(
+            Check(name="explainable removed, median", value=float(np.median(removed)), goal=0.95)
+        )
+        found.append(
+            Check(
+                name="explainable removed, 10th percentile",
+                value=float(np.quantile(removed, 0.1)),
+                goal=0.80,
+            )
+        )
+    if done:
+        cpu = [record["cpu_s"] for record in done]
+        found.append(_at_most("CPU s a data set, median", float(np.median(cpu)), 60.0))
+        found.append(_at_most("CPU s a data set, largest", max(cpu), None))
+    found += _baselines(done)
+    failed = len(records) - len(done)
+    found.append(_at_most("data sets that ended in an error", float(failed), 0.0))
+    return tuple(each for each in found if not math.isnan(each.value))
+
+
+def confusion(records: Sequence[dict[str, Any]]) -> dict[str, dict[str, int]]:
+    """Return, for each hidden effect, what was said how often; words of verdicts in brackets."""
+    rows: dict[str, Counter[str]] = defaultdict(Counter)
+    for record in records:
+        if "error" in record or record["cell"] not in ("single", "null", "null_imperfect"):
+            continue
+        found = judged(record)
+        rows[found.hidden[0] if found.hidden else "(nothing)"][found.said] += 1
+    return {name: dict(rows[name].most_common()) for name in sorted(rows)}
+
+
+def curve(records: Sequence[dict[str, Any]]) -> list[dict[str, float]]:
+    """Return how often the right effect is named, by how much of the residual it makes."""
+    out: list[dict[str, float]] = []
+    for low, high in itertools.pairwise(SEEN):
+        within = [
+            judged(record).has_effect
+            for record in records
+            if "error" not in record and record["cell"] == "single"
+            and low <= (record["hidden"][0]["share"] or 0.0) < high
+        ]  # fmt: skip
+        if within:
+            out.append({"from": low, "to": high, "n": len(within), "named": float(np.mean(within))})
+    return out
+
+
+def confusion_text(records: Sequence[dict[str, Any]]) -> str:
+    """Return the confusion matrix as a person reads it: one line for each hidden effect."""
+    lines: list[str] = []
+    for name, row in confusion(records).items():
+        count = sum(row.values())
+        right = row.get(name, 0)
+        others = ", ".join(f"{said} {number}" for said, number in row.items() if said != name)
+        lines.append(f"{name:<22} {right:>3}/{count:<3} {others}")
+    return "\n".join(lines)
+
+
+def _is_false(each: Judged) -> bool:
+    return each.false_names > 0
+
+
+def _rate(
+    name: str, among: Sequence[Judged], is_hit: Callable[[Judged], bool], goal: float | None,
+    goal_is: Any = "at least",
+) -> Check:  # fmt: skip
+    return _share(name, sum(map(is_hit, among)), len(among), goal, goal_is)
+
+
+def _share(
+    name: str, hits: int, count: int, goal: float | None, goal_is: Any = "at least"
+) -> Check:
+    low, high = wilson(hits, count)
+    value = hits / count if count else math.nan
+    return Check(
+        name=f"{name} (n = {count})", value=value, goal=goal, goal_is=goal_is, low=low, high=high
+    )
+
+
+def _at_most(name: str, value: float, goal: float | None) -> Check:
+    return Check(name=name, value=value, goal=goal, goal_is="at most")
+
+
+def _baselines(records: Sequence[dict[str, Any]]) -> list[Check]:
+    """Return the same figures of the baselines, on the data sets that they ran on."""
+    with_them = [
+        record for record in records if "baselines" in record and record["cell"] == "single"
+    ]
+    found: list[Check] = []
+    for name in ("base_only", "all_at_once", "mlp"):
+        shares = [record["baselines"][name]["share_removed"] for record in with_them]
+        if not shares:
+            continue
+        right = sum(
+            record["baselines"][name]["name"] == record["hidden"][0]["name"] for record in with_them
+        )
+        found.append(_share(f"baseline {name}: right effect", right, len(shares), None))
+        found.append(
+            Check(
+                name=f"baseline {name}: explainable removed, median", value=float(np.median(shares))
+            )
+        )
+    return found

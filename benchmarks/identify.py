@@ -1,0 +1,81 @@
+"""Hides effects in data sets and counts how often `riposte identify` names them.
+
+The protocol is in ``identification/protocol.py``; every finished data set is a line of
+``runs/identify-COMMIT.jsonl``, so that a second call goes on. All of it takes hours; a share:
+``python -m benchmarks.identify --share 0.05``.
+"""
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+from benchmarks.harness import ROOT
+from benchmarks.identification.protocol import protocol, smoke
+from benchmarks.identification.running import PROCESSES, run
+from benchmarks.identification.table import checks_of, confusion, confusion_text, curve
+from services.jobs.bench import Measurement, report_of, text_of
+from shared.runtime.build import commit
+
+QUESTION = "how often the hidden effect is named, and how often one that is not there"
+BASELINES_EVERY = 7
+"""Of the data sets; no multiple of 2, so that both arms are among them."""
+
+
+def measure(smoke: bool) -> Measurement:
+    """Return the table of the whole protocol."""
+    if smoke:
+        with tempfile.TemporaryDirectory() as folder:
+            return measured(Path(folder) / "smoke.jsonl", share=0.0)
+    return measured(default_path(), share=1.0)
+
+
+def default_path() -> Path:
+    """Return where the records of this commit are kept."""
+    return ROOT / "runs" / f"identify-{commit() or 'unknown'}.jsonl"
+
+
+def measured(path: Path, share: float, processes: int = PROCESSES) -> Measurement:
+    """Run a share of the protocol, or go on with it; 0 is the smoke test.
+
+    Args:
+        path: of the records.
+        share: of the protocol's numbers.
+        processes: how many at once.
+    """
+    trials = protocol(share) if share else smoke()
+    every = BASELINES_EVERY if share else len(trials)
+    records = run(trials, path, every, processes)
+    first, *others = checks_of(records)
+    print(confusion_text(records), file=sys.stderr)
+    names = {check.name: check for check in others}
+    baseline = next((names[name] for name in names if "all_at_once: right" in name), None)
+    return Measurement(
+        value=first.value,
+        unit="share of hidden effects named",
+        limit=baseline.value if baseline else 0.0,
+        ratio=first,
+        runs=tuple(records),
+        checks=tuple(others),
+        details={"confusion": confusion(records), "by_share_of_the_residual": curve(records)},
+    )
+
+
+def main() -> int:
+    """Run a share of the protocol and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--share", type=float, default=1.0, help="of the protocol's numbers (1)")
+    parser.add_argument("--out", type=Path, default=default_path(), help="JSON lines (%(default)s)")
+    parser.add_argument("--processes", type=int, default=PROCESSES, help="at once (%(default)s)")
+    found = parser.parse_args()
+    if not 0.0 < found.share <= 1.0 or found.processes < 1:
+        parser.error("--share is over 0 and at most 1, --processes at least 1")
+    report = report_of(
+        "identify", lambda: measured(found.out, found.share, found.processes), smoke=False
+    )
+    print(text_of(report))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

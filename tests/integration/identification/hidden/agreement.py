@@ -1,0 +1,80 @@
+"""How far the hidden implementation of an effect and the catalogue's are apart."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shared.identification.catalogue import effects
+from shared.identification.hidden.generator import simulated
+from shared.identification.hidden.noise import NoiseLevels
+from shared.identification.hidden.recipe import Recipe, Wish
+from shared.identification.subject import recorded_of, subject_of
+from shared.sim.plant.rollouts import Rollouts
+from shared.sim.plant.signals import pose_error, sampled_poses
+
+USUAL = NoiseLevels()
+SILENT = NoiseLevels(
+    encoder=0.0, tracker_position=0.0, tracker_rotation=0.0, drift_position=0.0,
+    drift_rotation=0.0, torque=0.0, initial=0.0,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Root mean squares over all recordings, in units of the usual sensors' noise."""
+
+    effect: float
+    """What the effect changes."""
+    apart: float
+    """What the two implementations change differently; time steps do not count."""
+
+    @property
+    def share(self):
+        return self.apart / self.effect
+
+
+def agreement(arm, name, place, size, seed=4):
+    """Hide an effect without any noise in a robot of the model file; replay it both ways."""
+    recipe = Recipe(
+        arm=arm, seed=seed, spread=0.0, noise=SILENT, has_shares=False, seconds=3.0, train=2,
+        test=1, wishes=(Wish(name, place, size),),
+    )  # fmt: skip
+    dataset, truth = simulated(recipe)
+    plain, _ = simulated(replace(recipe, wishes=()))
+    found = truth.effect[0]
+    subject = subject_of(dataset)
+    effect = next(each for each in effects() if each.name == name)
+    where = found.where
+    values = np.array([each.value for each in found.quantities])
+    structure = effect.structure(subject, where)
+    rollouts = Rollouts(subject.plant, structure, 8) if structure else subject.nominal
+    recorded = recorded_of(dataset)
+    usual = [
+        replace(each, initial_q=other.initial_q)
+        for each, other in zip(recorded, plain.trajectories, strict=True)
+    ]
+    without = subject.nominal.run([(lambda row: None, each) for each in usual])
+    within = rollouts.run(
+        [(lambda row: effect.enter(row, where, values), each) for each in recorded]
+    )
+    hidden, found = [], []
+    for logged, usual, one, other in zip(
+        dataset.trajectories, plain.trajectories, within, without, strict=True
+    ):
+        kept = np.isin(usual.joints_at, logged.joints_at)
+        pose = sampled_poses(usual.tracker_at, usual.tracker, logged.tracker_at)
+        hidden += _changes(logged.q, usual.q[kept], logged.tracker, pose)
+        found += _changes(one.q, other.q, one.tracker, other.tracker)
+    change = np.concatenate(hidden)
+    return Agreement(_rms(change), _rms(change - np.concatenate(found)))
+
+
+def _changes(q, usual_q, pose, usual_pose):
+    return [
+        ((q - usual_q) / USUAL.encoder).ravel(),
+        (pose_error(pose, usual_pose) / USUAL.tracker).ravel(),
+    ]
+
+
+def _rms(values):
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,59 @@
+"""The way an effect is hidden and the catalogue's way are the same physics.
+
+These hold the generator and the catalogue against each other: where they part, one of them is
+wrong. Limits are shares of what the effect changes, time steps of 1 and 2 ms included.
+"""
+
+import pytest
+
+from tests.integration.identification.hidden.agreement import agreement
+
+EXACT = [
+    ("arm3", "command_latency", "", 0.02, 0.02),
+    ("arm3", "tracker_latency", "", 0.02, 0.03),
+    ("arm3", "clock_skew", "", 3000.0, 0.05),
+    ("arm3", "sample_and_hold", "", 0.05, 0.1),
+    ("arm3", "dropped_packets", "", 0.15, 0.02),
+    ("arm3", "payload", "", 0.3, 0.02),
+    ("arm3", "gravity_tilt", "", 0.05, 0.02),
+    ("arm3", "inertia_error", "shoulder", 0.8, 0.02),
+    ("arm3", "joint_spring", "elbow", 2.0, 0.02),
+    ("arm3", "torque_bias", "shoulder", 1.0, 0.02),
+    ("arm3", "cogging", "shoulder", 1.0, 0.03),
+    ("arm3", "nonlinear_viscous", "elbow", 0.3, 0.03),
+    ("arm3", "asymmetric_friction", "shoulder", 1.0, 0.03),
+    ("arm3", "external_contact", "elbow in swings", 5.0, 0.03),
+    ("arm3", "tool_offset", "", 0.01, 0.02),
+    ("arm3", "tracker_frame", "", 0.01, 0.02),
+    ("arm3", "thermal_derating", "shoulder", 2e-3, 0.06),
+    ("torque2", "torque_gain", "elbow", 0.2, 0.03),
+    ("pr2", "command_frame", "", 0.01, 0.02),
+]
+"""Arm, effect, place, size, limit."""
+ALIKE = [
+    ("arm3", "tracker_slip", "swings", 0.01, 0.2),  # it takes 30 ms here
+    ("arm3", "counterbalance", "elbow", 0.1, 0.2),  # Coriolis torques are the catalogue's
+    ("arm3", "encoder_offset", "shoulder", 0.05, 0.15),  # a controller of 1 kHz
+    ("arm3", "joint_elasticity", "elbow", 6e-3, 0.15),  # another damping
+    ("arm3", "base_compliance", "", 1e-3, 0.15),
+    ("arm3", "backlash", "shoulder", 0.03, 0.2),
+    ("arm3", "coupled_wrist", "elbow", 0.8, 0.2),  # bristles
+    ("arm3", "load_friction", "shoulder", 0.2, 0.25),
+    ("torque2", "coulomb_friction", "shoulder", 0.2, 0.25),
+]
+"""The same where the two models of an effect are not quite the same."""
+
+
+@pytest.mark.parametrize(("arm", "name", "place", "size", "limit"), EXACT)
+def test_both_ways_of_an_effect_move_the_arm_alike(arm, name, place, size, limit):
+    found = agreement(arm, name, place, size)
+    assert found.effect > 0.5
+    assert found.share < limit
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("arm", "name", "place", "size", "limit"), ALIKE)
+def test_another_model_of_an_effect_moves_the_arm_nearly_alike(arm, name, place, size, limit):
+    found = agreement(arm, name, place, size)
+    assert found.effect > 0.5
+    assert found.share < limit

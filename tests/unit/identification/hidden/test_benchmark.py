@@ -1,0 +1,114 @@
+import json
+
+import pytest
+
+from benchmarks.identification.judging import judged
+from benchmarks.identification.protocol import FIRST_SEED, protocol
+from benchmarks.identification.running import finished
+from benchmarks.identification.table import checks_of, confusion, wilson
+from shared.sim.hidden.effect import hidden_effects
+
+
+def cause(name, where="", value=1.0, low=0.9, high=1.1, quantity="size", others=None):
+    return {
+        "name": name, "where": where, "quantity": quantity, "value": value,
+        "interval": [low, high], "others": others or {},
+    }  # fmt: skip
+
+
+def effect(name, where="", **values):
+    values = values or {"size": [1.0, "kg"]}
+    return {"name": name, "where": where, "share": 0.5, "values": values}
+
+
+def record(cell="single", hidden=(), named=(), ties=(), verdict="named", key="k", unexplained=0):
+    return {
+        "key": key, "cell": cell, "hidden": list(hidden), "named": list(named),
+        "ties": [list(tie) for tie in ties], "verdict": verdict, "unexplained": unexplained,
+        "share_removed": 0.9, "cpu_s": 10.0,
+    }  # fmt: skip
+
+
+def test_the_right_effect_at_another_joint_is_half_right():
+    found = judged(record(hidden=[effect("spring", "elbow")], named=[cause("spring", "wrist")]))
+    assert (found.has_effect, found.has_place, found.false_names) == (True, False, 0)
+
+
+def test_a_tie_with_the_hidden_effect_is_no_false_name_and_one_without_it_is():
+    hidden = [effect("spring", "elbow")]
+    tie = [cause("bias", "elbow"), cause("spring", "elbow")]
+    found = judged(record(hidden=hidden, ties=[tie], verdict="tie"))
+    assert (found.has_tie, found.is_tied, found.has_effect) == (True, True, False)
+    assert found.false_names == 0
+    assert judged(record(hidden=hidden, ties=[[cause("a"), cause("b")]])).false_names == 1
+
+
+def test_any_name_where_nothing_is_hidden_is_false():
+    assert judged(record("null", named=[cause("payload")])).false_names == 1
+    assert judged(record("null", verdict="none")).false_names == 0
+
+
+def test_the_error_of_a_vector_is_that_of_all_numbers_in_its_unit():
+    hidden = effect("frame", x=[3.0, "m"], y=[4.0, "m"], turn=[9.0, "rad"])
+    named = cause("frame", quantity="x", value=3.0, others={"y": 3.0, "turn": 1.0})
+    assert judged(record(hidden=[hidden], named=[named])).errors == pytest.approx((0.2,))
+
+
+def test_an_interval_covers_or_does_not():
+    hidden = [effect("payload")]
+    assert judged(record(hidden=hidden, named=[cause("payload")])).covered == (True,)
+    missed = cause("payload", value=1.2, low=1.1, high=1.3)
+    assert judged(record(hidden=hidden, named=[missed])).covered == (False,)
+
+
+def test_rates_of_the_table_are_those_of_the_records():
+    hidden = [effect("payload")]
+    records = [
+        record(hidden=hidden, named=[cause("payload")]),
+        record(hidden=hidden, verdict="none"),
+        record("null", verdict="none"),
+        record("null", named=[cause("payload")]),
+        {"key": "x", "cell": "single", "error": "what went wrong"},
+    ]
+    values = {check.name: check.value for check in checks_of(records)}
+    assert values["right effect (n = 2)"] == 0.5
+    assert values["false names, base right (n = 2)"] == 0.5
+    assert values["data sets that ended in an error"] == 1
+    assert not any(name.startswith("both of two") for name in values)
+    assert confusion(records) == {
+        "payload": {"payload": 1, "(none)": 1},
+        "(nothing)": {"(none)": 1, "payload": 1},
+    }
+
+
+def test_an_interval_of_a_rate_is_wilsons():
+    assert wilson(0, 10) == pytest.approx((0.0, 0.278), abs=1e-3)
+    assert wilson(21, 24) == pytest.approx((0.690, 0.957), abs=2e-3)
+
+
+def test_the_protocol_has_every_effect_and_seeds_of_its_own():
+    trials = protocol(0.05)
+    assert len({trial.key for trial in trials}) == len(trials)
+    assert all(trial.recipe.seed >= FIRST_SEED for trial in trials)
+    singles = [trial.recipe.wishes[0].name for trial in trials if trial.cell == "single"]
+    assert set(singles) == set(hidden_effects())
+    outside = [trial for trial in trials if trial.cell == "outside"]
+    assert all(trial.without == {trial.recipe.wishes[0].name} for trial in outside)
+
+
+def test_the_whole_protocol_has_the_numbers_of_the_issue():
+    counts = {}
+    for trial in protocol():
+        counts[trial.cell] = counts.get(trial.cell, 0) + 1
+    assert counts["single"] == 20 * len(hidden_effects()) >= 400
+    assert {name: counts[name] for name in ("null", "null_imperfect", "two", "outside", "tie")} == {
+        "null": 100, "null_imperfect": 100, "two": 60, "outside": 40, "tie": 20,
+    }  # fmt: skip
+
+
+def test_a_line_that_a_crash_cut_off_is_done_again(tmp_path):
+    path = tmp_path / "records.jsonl"
+    whole = json.dumps(record())
+    path.write_text(f'{whole}\n{{"key": "cut', encoding="utf-8")
+    assert [each["key"] for each in finished(path)] == ["k"]
+    assert finished(tmp_path / "none.jsonl") == []
