@@ -184,7 +184,8 @@ def _enter_base(row: Row, subject: Subject, verdict: Verdict) -> None:
     for value in verdict.base:
         if value.name not in known:
             raise IdentificationError(f"the verdict fits {value.name!r}, which this arm has not")
-        known[value.name].change(row, value.extended)
+        # Of a tie nothing is written, so neither is the base that was fitted together with it.
+        known[value.name].change(row, value.extended if verdict.causes else value.base_fit)
 
 
 def _touched(dataset: Dataset, subject: Subject, entry: _Entry) -> tuple[set[str], set[str]]:

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
@@ -28,6 +29,10 @@ STAGE_COLOURS = {
     "extended": COLOURS["protagonist"],
 }
 STAGE_NAMES = {"nominal": "nominal", "base_fit": "base fit", "extended": "extended"}
+HEAT = LinearSegmentedColormap.from_list(
+    "heat", [(0.95, 0.62, 0.2, 0.12), (0.93, 0.45, 0.15, 0.75), (0.72, 0.05, 0.2, 1.0)]
+)
+"""From next to nothing to dark red, on white and on near-black."""
 LONGEST_NAME = 26
 MOST_POINTS = 900
 """Of a curve."""
@@ -206,7 +211,7 @@ def timeline(
         for row, (_, edges, values) in enumerate(lanes):
             picture = axes.pcolormesh(
                 edges, [row - 0.28, row + 0.28], np.log10(np.maximum(values, 0.3))[None],
-                cmap="YlOrRd", vmin=0.0, vmax=1.3, rasterized=False, linewidth=0,
+                cmap=HEAT, vmin=0.0, vmax=1.3, rasterized=False, linewidth=0,
             )  # fmt: skip
         for row, begin, end, mark in spans:
             axes.plot([begin, end], [row + 0.38] * 2, color=INK, linewidth=2.4,

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from services.jobs.identify.residuals import rms_by_joint, shown, tracker_off
+from services.jobs.identify.residuals import rms_by_joint, shown, stages_of, tracker_off
 from services.jobs.identify.words import cause_text, unexplained_text
 from shared.identification.dataset.types import Dataset, Float64
-from shared.identification.evidence import STAGES, Evidence, Replay
+from shared.identification.evidence import Evidence, Replay
 from shared.identification.subject import plant_of
 from shared.identification.verdict import Verdict
 from shared.sim.plant.looks import Looks
@@ -54,7 +54,7 @@ def overlay_of(name: str, looks: Looks, verdict: Verdict, evidence: Evidence) ->
         if each.trajectory in starts
     ]  # fmt: skip
     arms = {"measured": _poses(looks, replays, begins, [replay.q for replay in replays])}
-    for stage in ("base_fit", "extended") if verdict.causes else ("base_fit",):
+    for stage in stages_of(verdict)[1:]:
         predicted = [_held(replay.predicted[stage]) for replay in replays]
         arms[stage] = _poses(looks, replays, begins, predicted)
     return Overlay(
@@ -110,7 +110,7 @@ def _joints(
     verdict: Verdict, evidence: Evidence, replays: Sequence[Replay], begins: Sequence[float]
 ) -> list[Curves]:
     """Return the curves of each joint, furthest off first."""
-    stages = STAGES if verdict.causes else STAGES[:2]
+    stages = stages_of(verdict)
     at = _line(replays, begins, [replay.at for replay in replays])
     off = np.nan_to_num(rms_by_joint(shown(evidence), "base_fit") / evidence.noise, posinf=1e9)
     curves: list[Curves] = []
@@ -140,7 +140,7 @@ def _tracker(verdict: Verdict, replays: Sequence[Replay], begins: Sequence[float
     known = [replay for replay, _ in tracked]
     times = [replay.tracker_at for replay in known if replay.tracker_at is not None]
     at = _line(known, [begin for _, begin in tracked], times)
-    stages = STAGES if verdict.causes else STAGES[:2]
+    stages = stages_of(verdict)
     off = [tracker_off(replay) for replay in known]
     residual = {
         str(stage): 1e3 * _joined([each[stage] for each in off])

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from services.jobs.identify import considered, pictures, words
+from services.jobs.identify.residuals import stages_of
 from shared.identification.evidence import Evidence
 from shared.identification.model_file import Carried
 from shared.identification.verdict import Cause, Verdict
@@ -88,7 +89,7 @@ def _tiles(verdict: Verdict) -> list[tuple[Node, Node, str]]:
             "of the explainable residual on held-out motion is removed",
             "good",
         ))  # fmt: skip
-    last = held_out.extended if verdict.causes else held_out.base_fit
+    last = getattr(held_out, stages_of(verdict)[-1])
     tiles.append((
         f"{words.number_text(held_out.nominal)} \N{RIGHTWARDS ARROW} {words.number_text(last)}",
         "times the noise floor, nominal model to the best",

@@ -12,14 +12,15 @@ from services.jobs.identify.residuals import (
     residual,
     rms_by_joint,
     shown,
+    stages_of,
     tracker_off,
     window_of,
     worst_joint,
 )
 from services.jobs.identify.words import unexplained_mark
 from shared.identification.dataset.types import Float64
-from shared.identification.evidence import STAGES, Diagnostics, Evidence, Stage
-from shared.identification.verdict import BaseValue, Verdict
+from shared.identification.evidence import Diagnostics, Evidence
+from shared.identification.verdict import BaseValue, Scored, Verdict
 from shared.telemetry import identification_diagnostics as diagnostic
 from shared.telemetry import identification_figures as figures
 from shared.telemetry.identification_diagnostics import Line, Row
@@ -27,7 +28,8 @@ from shared.telemetry.identification_diagnostics import Line, Row
 MOST_JOINTS = 4
 """In a diagnostic."""
 MOST_CANDIDATES = 12
-"""In the picture; the table has all."""
+"""Refitted ones in the picture; the table has all."""
+MOST_OTHERS = 3
 MOST_PARAMETERS = 16
 MOST_LANES = 10
 AXES = {
@@ -51,7 +53,7 @@ def stages(verdict: Verdict) -> Picture:
     """Return how far off each stage is."""
     held_out = verdict.held_out
     values = {"nominal": held_out.nominal, "base_fit": held_out.base_fit}
-    if verdict.causes:
+    if "extended" in stages_of(verdict):
         values["extended"] = held_out.extended
     words = (
         "Root-mean-square residual on motion that nothing was fitted to. 1 is as good as it gets."
@@ -59,15 +61,10 @@ def stages(verdict: Verdict) -> Picture:
     return Picture(figures.stages_against_noise(values), words)
 
 
-def _stages(verdict: Verdict) -> tuple[Stage, ...]:
-    """Return the stages that differ: without a cause the extended model is the base fit."""
-    return STAGES if verdict.causes else STAGES[:2]
-
-
 def by_joint(verdict: Verdict, evidence: Evidence) -> Picture:
     """Return the residual of each joint by stage."""
     replays = shown(evidence)
-    found = {stage: 1e3 * rms_by_joint(replays, stage) for stage in _stages(verdict)}
+    found = {stage: 1e3 * rms_by_joint(replays, stage) for stage in stages_of(verdict)}
     finite = {stage: np.where(np.isfinite(v), v, np.nan) for stage, v in found.items()}
     svg = figures.residuals_by_joint(
         evidence.joints, finite, 1e3 * evidence.noise, _small_unit(evidence)
@@ -86,7 +83,7 @@ def motion(window: Window, verdict: Verdict, evidence: Evidence) -> Picture:
     joint, unit = evidence.joints[window.joint], evidence.units[window.joint]
     predicted = {
         str(stage): window.replay.predicted[stage][window.rows, window.joint]
-        for stage in _stages(verdict)
+        for stage in stages_of(verdict)
     }
     measured = window.replay.q[window.rows, window.joint]
     svg = figures.motion(window.at, measured, predicted, f"{figures.plain(joint)} ({unit})")
@@ -99,7 +96,7 @@ def left_over(window: Window, verdict: Verdict, evidence: Evidence) -> Picture:
     small = _thousandths(evidence.units[index])
     residuals = {
         str(stage): 1e3 * residual(window.replay, stage)[window.rows, index]
-        for stage in _stages(verdict)[1:]
+        for stage in stages_of(verdict)[1:]
     }
     svg = figures.residual_over_time(
         window.at, residuals, 1e3 * float(evidence.noise[index]),
@@ -119,7 +116,7 @@ def tracker(window: Window, verdict: Verdict, evidence: Evidence) -> Picture | N
         return None
     inside = (at >= window.at[0]) & (at <= window.at[-1])
     noise = None if evidence.tracker_noise is None else 1e3 * evidence.tracker_noise[0]
-    stages = _stages(verdict)
+    stages = stages_of(verdict)
     residuals = {str(k): 1e3 * values[inside] for k, values in off.items() if k in stages}
     svg = figures.residual_over_time(at[inside], residuals, noise, "tracker (mm)")
     return Picture(svg, "How far the tracker is from where each stage expects it, same stretch.")
@@ -188,12 +185,19 @@ def candidates(verdict: Verdict) -> Picture | None:
             is_named=(each.effect, each.where) in named,
             is_tied=(each.effect, each.where) in tied,
         )
-        for each in verdict.candidates[:MOST_CANDIDATES]
+        for each in _shown(verdict)
     ]
     words = "What each candidate takes off the held-out loss when the base is fitted with it."
     words += " Blue: named." if named else ""
     words += " Orange: one of a tie." if tied else ""
     return Picture(diagnostic.candidates(rows), words)
+
+
+def _shown(verdict: Verdict) -> list[Scored]:
+    """Return the candidates that were refitted, and the best few of the others."""
+    refitted = [each for each in verdict.candidates if each.gain is not None]
+    others = [each for each in verdict.candidates if each.gain is None]
+    return [*refitted[:MOST_CANDIDATES], *others[:MOST_OTHERS]]
 
 
 def unexplained(verdict: Verdict, evidence: Evidence) -> Picture:
@@ -208,7 +212,8 @@ def unexplained(verdict: Verdict, evidence: Evidence) -> Picture:
         for number, left in enumerate(verdict.unexplained)
         if left.trajectory in names
     ]
-    words = "What the best model leaves over, darker where more; letters are those of the table."
+    words = "What the best model leaves over, darker where more"
+    words += "; letters are those of the table." if spans else "."
     return Picture(figures.timeline(lanes, spans), words)
 
 

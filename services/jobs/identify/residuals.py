@@ -33,6 +33,11 @@ class Window:
         return self.replay.at[self.rows]
 
 
+def stages_of(verdict: Verdict) -> tuple[Stage, ...]:
+    """Return the stages that differ: without cause or tie the extended model is the base fit."""
+    return STAGES if verdict.causes or verdict.ties else STAGES[:2]
+
+
 def shown(evidence: Evidence) -> tuple[Replay, ...]:
     """Return the held-out trajectories, or all of them where nothing was held out."""
     return evidence.held_out or evidence.replays

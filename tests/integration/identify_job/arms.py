@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shared.identification.base import base_parameters
+from shared.identification.base import BaseParameter, base_parameters
 from shared.identification.dataset.reading import PR2_JOINTS
 from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource, Trajectory
 from shared.identification.subject import subject_of
@@ -75,9 +75,13 @@ def cause(effect: str, where: str, quantity: str, value: float, **others: float)
 
 def verdict_of(dataset: Dataset, *causes: Cause, factor: float = 1.2) -> Verdict:
     """Return a verdict whose base parameters all moved by a factor."""
+
+    def moved(each: BaseParameter) -> float:
+        return factor * each.nominal + (0.0 if each.nominal else 0.05)
+
     base = tuple(
-        BaseValue(name=each.name, unit=each.unit, nominal=each.nominal, base_fit=each.nominal,
-                  extended=factor * each.nominal + (0.0 if each.nominal else 0.05),
+        BaseValue(name=each.name, unit=each.unit, nominal=each.nominal, base_fit=moved(each),
+                  extended=moved(each),
                   interval=Interval(low=0.0, high=1.0))
         for each in base_parameters(subject_of(dataset, capacity=1))
     )  # fmt: skip

@@ -255,7 +255,7 @@ def _none(joints: Sequence[str], has_tracker: bool) -> Example:
 
 def _tie(joints: Sequence[str], has_tracker: bool) -> Example:
     rng = np.random.default_rng(3)
-    found = replays(joints, rng, (0.06, 0.02, 0.02), (0.0, 0.0, 0.0), has_tracker=has_tracker)
+    found = replays(joints, rng, (0.06, 0.02, 0.0), (0.0, 0.0, 0.0), has_tracker=has_tracker)
     tie = Tie(
         causes=(LATENCY, OFFSET), alike=0.998,
         record="Log the joints as well: a late tracker leaves them as they are.",
