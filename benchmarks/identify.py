@@ -44,7 +44,7 @@ def measured(path: Path, share: float, processes: int = PROCESSES) -> Measuremen
         processes: how many at once.
     """
     trials = protocol(share) if share else smoke()
-    every = BASELINES_EVERY if share else len(trials)
+    every = BASELINES_EVERY if share else 0
     records = run(trials, path, every, processes)
     first, *others = checks_of(records)
     print(confusion_text(records), file=sys.stderr)

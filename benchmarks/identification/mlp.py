@@ -25,7 +25,7 @@ def mlp(found: Search, rng: np.random.Generator) -> dict[str, Any]:
     centre, scale = train[0].mean(axis=0), train[0].std(axis=0) + 1e-9
     height = float(np.sqrt(np.mean(train[1] ** 2)))
     net = MLPRegressor(
-        (64, 64), alpha=1e-2, early_stopping=True, max_iter=200,
+        hidden_layer_sizes=(64, 64), alpha=1e-2, early_stopping=True, max_iter=200,
         random_state=int(rng.integers(2**31)),
     )  # fmt: skip
     with warnings.catch_warnings():
