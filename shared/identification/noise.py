@@ -17,6 +17,8 @@ _BAND = 25
 """Without repeats: readings that a local cubic is taken through."""
 _STRETCH = 25
 """Blocks whose power is looked at together."""
+_FEWEST = 10
+"""Readings that two recordings have to share, else the last of the shorter one is held."""
 _SAMPLES = 200
 """Of simulated noise, to learn what leaving out the noisiest stretches takes off."""
 
@@ -88,7 +90,7 @@ def _against(first: Trajectory, second: Trajectory) -> Float64:
     at = first.joints_at
     inside = at <= second.joints_at[-1]
     out = first.q - sampled(second.joints_at, second.q, at)
-    return out[inside] if inside.sum() > 10 else out
+    return out[inside] if inside.sum() > _FEWEST else out
 
 
 def _tracker_against(first: Trajectory, second: Trajectory) -> Float64:
@@ -97,7 +99,9 @@ def _tracker_against(first: Trajectory, second: Trajectory) -> Float64:
     assert second.tracker_at is not None
     assert second.tracker is not None
     other = sampled_poses(second.tracker_at, second.tracker, first.tracker_at)
-    return pose_error(first.tracker, other)
+    out = pose_error(first.tracker, other)
+    inside = first.tracker_at <= second.tracker_at[-1]
+    return out[inside] if inside.sum() > _FEWEST else out
 
 
 def _fast(at: Float64, values: Float64) -> Float64:
@@ -124,7 +128,8 @@ def _floor(parts: list[Float64], scale: float) -> tuple[Float64, Float64]:
     """Return standard deviations and neighbours' correlations, by column.
 
     A stretch in which repeats part company (contact, a singular posture) would hide everything, so
-    the floor is taken from the stretches of 0.5 s without their noisiest fifth.
+    the floor is taken from the stretches of 0.5 s without their noisiest fifth, and so are the
+    correlations: what parts slowly correlates like nothing else.
     """
     stretches = [
         part[begin : begin + _STRETCH]
@@ -132,17 +137,20 @@ def _floor(parts: list[Float64], scale: float) -> tuple[Float64, Float64]:
         for begin in range(0, max(len(part) - _STRETCH + 1, 1), _STRETCH)
     ]
     power = np.array([np.mean(stretch**2, axis=0) for stretch in stretches])
-    whole = np.concatenate(parts)
-    moved = np.concatenate([part[1:] * part[:-1] for part in parts]).mean(axis=0)
-    total = np.maximum(np.mean(whole**2, axis=0), 1e-30)
-    correlation = np.clip(moved / total, 0.0, 0.99)
-    variance = _quieter(power) / _lost(float(correlation.mean()), len(power))
+    pairs = [np.stack([stretch[1:], stretch[:-1]]) for stretch in stretches]
+    moved = np.array([np.prod(pair, axis=0).mean(axis=0) for pair in pairs])
+    total = np.array([np.mean(pair**2, axis=(0, 1)) for pair in pairs])
+    shared = _quieter(moved, power) / np.maximum(_quieter(total, power), 1e-30)
+    correlation = np.clip(shared, 0.0, 0.99)
+    variance = _quieter(power, power) / _lost(float(correlation.mean()), len(power))
     return scale * np.sqrt(np.maximum(variance, 1e-16)), correlation
 
 
-def _quieter(power: Float64) -> Float64:
-    """Return the mean over stretches without the noisiest fifth."""
-    return np.sort(power, axis=0)[: max(int(np.ceil(0.8 * len(power))), 1)].mean(axis=0)
+def _quieter(values: Float64, power: Float64) -> Float64:
+    """Return the mean over stretches without the noisiest fifth: float64[D] of float64[S, D]."""
+    count = max(int(np.ceil(0.8 * len(power))), 1)
+    kept = np.argsort(power, axis=0, kind="stable")[:count]
+    return np.take_along_axis(values, kept, axis=0).mean(axis=0)
 
 
 @cache
@@ -154,4 +162,5 @@ def _lost(correlation: float, stretches: int) -> float:
     for index in range(1, _STRETCH):
         fresh = rng.standard_normal((stretches, _SAMPLES))
         noise[index] = correlation * noise[index - 1] + np.sqrt(1 - correlation**2) * fresh
-    return float(_quieter(np.mean(noise**2, axis=0)).mean())
+    power = np.mean(noise**2, axis=0)
+    return float(_quieter(power, power).mean())
