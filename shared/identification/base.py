@@ -14,7 +14,7 @@ import numpy as np
 
 from shared.identification.dataset.types import Float64
 from shared.identification.subject import Subject
-from shared.sim.plant.row import Row
+from shared.sim.plant.row import Row, drives_of
 
 INERTIA_PRIOR = 0.1
 """Standard deviation of what is known of a link's mass and inertia (1)."""
@@ -120,9 +120,9 @@ def _gains(subject: Subject) -> list[BaseParameter]:
     found: list[BaseParameter] = []
     if subject.control == "torque":
         return found
-    for index, name in enumerate(subject.plant.actuators):
+    for name in subject.plant.actuators:
         actuator = int(model.actuator(name).id)
-        label = name.rsplit("/", 1)[-1] if subject.control == "pose" else subject.joints[index]
+        label = _driven(subject, actuator) or name.rsplit("/", 1)[-1]
         kp, kv = (
             float(model.actuator_gainprm[actuator, 0]),
             -float(model.actuator_biasprm[actuator, 2]),
@@ -134,6 +134,13 @@ def _gains(subject: Subject) -> list[BaseParameter]:
             if nominal > 0.0:
                 found.append(_factor(f"{word} {label}", "", nominal, _LOOSE, change))
     return found
+
+
+def _driven(subject: Subject, actuator: int) -> str:
+    """Return the joint that an actuator acts on alone; empty if there is none."""
+    plant, model = subject.plant, subject.nominal.model
+    drives = {label: drives_of(plant, model, label) for label in subject.joints}
+    return next((label for label, own in drives.items() if actuator in own), "")
 
 
 def _kp_setter(actuator: int) -> Callable[[Row, float], None]:
@@ -152,13 +159,15 @@ def _kv_setter(actuator: int) -> Callable[[Row, float], None]:
 
 
 def _inertias(subject: Subject) -> list[BaseParameter]:
-    """Return a factor of mass and inertia for each link that moves."""
+    """Return a factor of mass and inertia for each link that moves, however many joints it has."""
     model = subject.nominal.model
     found: list[BaseParameter] = []
+    seen: set[int] = set()
     for label in subject.joints:
         joint = int(model.joint(subject.plant.mj_joint(label)).id)
         body = int(model.jnt_bodyid[joint])
-        if model.body_mass[body] > 0.0:
+        if model.body_mass[body] > 0.0 and body not in seen:
+            seen.add(body)
             found.append(
                 BaseParameter(
                     name=f"mass {label}",
