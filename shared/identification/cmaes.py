@@ -34,6 +34,8 @@ def minimize(
         seed: of the search; not 0, which cma takes for the clock.
         generations: how many.
     """
+    if not start.size:
+        return start
     strategy = cma.CMAEvolutionStrategy(
         start.tolist(),
         sigma,

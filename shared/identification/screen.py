@@ -129,7 +129,7 @@ def _signatures(fit: Fit, variants: Sequence[Variant], segments: tuple[int, ...]
     """Return float64[V, M + n]: how the residual changes."""
     problem, n = fit.space.problem, fit.space.size
     found = problem.vector(variants, segments)
-    moved = found - fit.residual[:-n]
+    moved = found - fit.residual[: found.shape[1]]
     return np.concatenate([moved, np.zeros((len(variants), n))], axis=1)
 
 
