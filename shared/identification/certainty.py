@@ -8,12 +8,17 @@ from shared.identification.fit import Fit
 from shared.identification.gate import STRETCH
 from shared.identification.problem import BLOCK
 
+_MOST_OWN = 0.9
+"""Share of a stretch's own information that is taken out of the fit that judges it."""
+
 
 def half_widths(fit: Fit, segments: tuple[int, ...]) -> Float64:
     """Return float64[n]: half of the 95 % interval of each coordinate.
 
     The covariance is a sandwich over stretches of ``STRETCH`` (Huber 1967, White 1982), so that
-    neighbouring residuals may correlate and a misfit widens it.
+    neighbouring residuals may correlate and a misfit widens it. Each stretch's residual is taken
+    as a fit without that stretch would leave it (Bell and McCaffrey 2002, CR3): a fit bends
+    towards what it is judged by, the more so the fewer stretches there are to a number.
 
     Args:
         fit: on the recordings ``segments``.
@@ -21,19 +26,29 @@ def half_widths(fit: Fit, segments: tuple[int, ...]) -> Float64:
     """
     parts = fit.space.problem.residuals([fit.space.variant(fit.z)], segments)[0]
     size = round(STRETCH / BLOCK)
+    bread = np.asarray(np.linalg.pinv(fit.jacobian.T @ fit.jacobian), np.float64)
     scores: list[Float64] = []
     begin = 0
     for rows, channels in (part.shape for part in parts):
-        end = begin + rows * channels
-        weighted = (fit.jacobian[begin:end] * fit.residual[begin:end, None]).reshape(
-            rows, channels, -1
-        )
         count = max(rows // size, 1)
-        scores += [piece.sum(axis=(0, 1)) for piece in np.array_split(weighted, count)]
-        begin = end
+        for index in range(count):  # as np.array_split does
+            end = begin + (rows // count + (index < rows % count)) * channels
+            scores.append(_score(fit.jacobian[begin:end], fit.residual[begin:end], bread))
+            begin = end
     spread = np.stack(scores)
-    bread = np.linalg.pinv(fit.jacobian.T @ fit.jacobian)
     n = len(scores)
-    covariance = bread @ (spread.T @ spread) @ bread * n / max(n - 1, 1)
+    covariance = bread @ (spread.T @ spread) @ bread * max(n - 1, 1) / n
     factor = float(stdtrit(max(n - 1, 1), 0.975))
     return factor * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+
+def _score(jacobian: Float64, residual: Float64, bread: Float64) -> Float64:
+    """Return float64[n]: what one stretch pulls by, the fit being without it.
+
+    By Woodbury's identity that is (1 - A B)^-1 g, of size n, where g is the stretch's gradient, A
+    its information and B the inverse of all. A coordinate that no other stretch shows has no such
+    fit; a little of its information is left in.
+    """
+    information = _MOST_OWN * jacobian.T @ jacobian
+    left = np.eye(len(bread)) - information @ bread
+    return np.asarray(np.linalg.solve(left, jacobian.T @ residual), np.float64)
