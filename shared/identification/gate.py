@@ -8,6 +8,7 @@ loss, stretch by stretch, with an interval.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtri, stdtrit
 
 from shared.identification.dataset.types import Float64
 from shared.identification.problem import BLOCK, Problem, Variant
@@ -21,6 +22,8 @@ LEAST_SHARE = 0.05
 """Of the base fit's explainable held-out loss that a cause must take off to be of use."""
 LEAST_GAIN = 0.04
 """Of the held-out loss that is left when it comes, the same."""
+FEWEST = 4
+"""Stretches that it takes to be sure of anything."""
 _DRAWS = 2000
 
 
@@ -38,10 +41,10 @@ class Gain:
     before: float
     """Of the other."""
     low: float
-    """95 % interval of the difference."""
+    """95 % interval of the difference; wider by Student's t where there are few stretches."""
     high: float
     surely: float
-    """Low end of the 99 % interval."""
+    """Low end of the 99 % interval; minus infinity where stretches are too few to be sure."""
     error: float
     """Standard error of the difference."""
 
@@ -90,12 +93,17 @@ def compare(before: Float64, after: Float64, rng: np.random.Generator) -> Gain:
     difference = before - after
     picks = rng.integers(0, len(difference), (_DRAWS, len(difference)))
     means = difference[picks].mean(axis=1)
+    gain, count = float(difference.mean()), len(difference)
+    if count == 1:  # nothing is known of how much it varies
+        means = np.array([0.0, 2.0 * gain])
     low, high, surely = np.quantile(means, [0.025, 0.975, 0.005])
+    free = max(count - 1, 1)
+    wider = float(stdtrit(free, 0.975) / ndtri(0.975)) * np.sqrt((free + 1) / free)
     return Gain(
         loss=float(after.mean()),
         before=float(before.mean()),
-        low=float(low),
-        high=float(high),
-        surely=float(surely),
+        low=gain + wider * float(low - gain),
+        high=gain + wider * float(high - gain),
+        surely=float(surely) if count >= FEWEST else -np.inf,
         error=float(means.std()),
     )

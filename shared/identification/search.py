@@ -118,18 +118,20 @@ def begin(
     Raises:
         IdentificationError: the model does not fit the recordings.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)  # of the base fit, which may have been done before
     progress("noise floor", 0.0)
     subject = subject_of(dataset)
     noise = noise_of(dataset, BLOCK)
     known = base_parameters(subject)
+    if fits is not None and not {each.name for each in known} >= set(fits.names):
+        fits = None
     if fits is not None:
         known = tuple(each for each in known if each.name in fits.names)
     problem = Problem(subject, dataset, known, noise)
     progress("base fit", 0.0, f"{len(known)} parameters")
     space = Space(problem)
     done = fit_base(space, rng) if fits is None else fit_again(space, fits)
-    if doubted := _doubted(done.whole):
+    if fits is None and (doubted := _doubted(done.whole)):
         # What is known of a link does not hold, so the base may not bend it: what is wrong there
         # is looked for like any other cause.
         progress("base fit", 0.5, f"without {', '.join(each.name for each in doubted)}")
@@ -143,7 +145,7 @@ def begin(
     candidates, ruled_out = candidates_of(catalogue, subject, without)
     return Search(
         problem=problem,
-        rng=rng,
+        rng=np.random.default_rng([seed, 1]),
         candidates=candidates,
         ruled_out=ruled_out,
         doubted=tuple(
@@ -220,7 +222,7 @@ def _round(
     fit = polish(best.fit.space, best.fit.z, train, 6, enough=1e-4)
     losses = stretches(found.problem, fit.space.variant(fit.z), test)
     gain = compare(found.current_losses, losses, found.rng)
-    if gain.loss <= best.gain.loss:
+    if gain.loss <= best.gain.loss and (best.is_event or gain.is_useful(base)):
         best = Tried(best.screened, fit, gain, losses, best.is_event)
     found.accepted.append(best)
     found.rivals.append(rivals)
