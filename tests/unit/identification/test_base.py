@@ -1,0 +1,105 @@
+"""The base's coordinates: what they stand for, and that they leave no trace."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shared.identification.base import base_parameters, enter_base
+from shared.identification.subject import Subject
+from shared.sim.plant.plant import mjcf
+from shared.sim.plant.row import Row
+from tests.arms import JOINTS, make_plant, make_subject, recorded, write_arm
+
+_COMMAND = (0.5, 0.3, -0.5)
+
+
+@pytest.fixture(scope="module")
+def subject(tmp_path_factory: pytest.TempPathFactory) -> Subject:
+    return make_subject(make_plant(tmp_path_factory.mktemp("arm")))
+
+
+def test_every_joint_has_numbers_of_its_own(subject: Subject):
+    names = [each.name for each in base_parameters(subject)]
+    words = ("damping", "armature", "friction_loss", "kp", "kv", "mass")
+    assert sorted(names) == sorted(f"{word} {joint}" for word in words for joint in JOINTS)
+
+
+def test_nought_is_nominal_and_one_a_factor_e_or_the_scale(subject: Subject):
+    for each in base_parameters(subject):
+        assert each.value(0.0) == each.nominal
+        assert each.low <= 0.0 <= each.high
+        expected = np.e * each.nominal if each.is_factor else each.nominal + each.scale
+        assert each.value(1.0) == pytest.approx(expected)
+        assert each.value(each.low) >= 0.0
+
+
+def test_frictions_low_bound_is_no_friction_at_all(subject: Subject):
+    found = [each for each in base_parameters(subject) if each.name.startswith("friction_loss")]
+    assert [each.value(each.low) for each in found] == [0.0, 0.0, 0.0]
+    assert [each.nominal for each in found] == pytest.approx([0.1, 0.1, 0.05])
+
+
+def test_values_go_where_they_belong(subject: Subject):
+    parameters = base_parameters(subject)
+    x = np.full(len(parameters), 0.1)
+    row = subject.nominal.entered(lambda row: enter_base(parameters, x, row), recorded(_COMMAND))
+    model, factor = subject.nominal.model, np.exp(0.1)
+    assert row.field("dof_damping") == pytest.approx(factor * model.dof_damping)
+    assert row.field("dof_frictionloss") == pytest.approx(1.1 * model.dof_frictionloss)
+    assert row.field("actuator_gainprm")[:, 0] == pytest.approx([200.0 * factor] * 3)
+    assert row.field("actuator_biasprm")[:, 1] == pytest.approx([-200.0 * factor] * 3)
+    assert row.field("actuator_biasprm")[:, 2] == pytest.approx([-10.0 * factor] * 3)
+    fore = model.body("fore").id
+    assert row.field("body_mass")[fore] == pytest.approx(0.5 * factor)
+    assert row.field("body_inertia")[fore] == pytest.approx(factor * model.body_inertia[fore])
+
+
+def test_a_base_that_was_entered_leaves_no_trace(subject: Subject):
+    parameters = base_parameters(subject)
+    x = np.full(len(parameters), 0.3)
+
+    def enter(row: Row) -> None:
+        enter_base(parameters, x, row)
+
+    def leave(row: Row) -> None:
+        enter_base(parameters, np.zeros(len(parameters)), row)
+
+    one = recorded(_COMMAND, seconds=0.5)
+    before, changed, after, again = (
+        subject.nominal.run([(entry, one)])[0].q for entry in (leave, enter, leave, enter)
+    )
+    assert np.array_equal(before, after)
+    assert np.array_equal(changed, again)
+    assert np.abs(changed - before).max() > 1e-3
+
+
+def test_a_link_of_two_joints_has_one_mass(tmp_path: Path):
+    path = write_arm(tmp_path)
+    one_body = path.read_text().replace('<body name="upper" >', "").replace(
+        '<inertial pos="0.2 0 0" mass="1.0" diaginertia="0.002 0.015 0.015"/>', ""
+    )  # fmt: skip
+    path.write_text(one_body.replace("</body>", "", 1))
+    subject = make_subject(mjcf(path, "position", JOINTS, JOINTS, "tool"))
+    names = [each.name for each in base_parameters(subject)]
+    assert [name for name in names if name.startswith("mass")] == ["mass pan", "mass elbow"]
+
+
+def test_gains_are_called_after_the_joint_they_drive(tmp_path: Path):
+    path = write_arm(tmp_path)
+    turned = mjcf(path, "position", JOINTS, JOINTS[::-1], "tool")
+    subject = make_subject(turned)
+    model = subject.nominal.model
+    kp = next(each for each in base_parameters(subject) if each.name == "kp elbow")
+    row = subject.nominal.entered(lambda row: kp.change(row, 50.0), recorded(_COMMAND))
+    gains = row.field("actuator_gainprm")[:, 0]
+    assert gains[model.actuator("elbow").id] == 50.0
+    assert sorted(gains) == [50.0, 200.0, 200.0]
+
+
+def test_friction_that_a_model_lacks_is_no_parameter(tmp_path: Path):
+    path = write_arm(tmp_path)
+    path.write_text(path.read_text().replace('frictionloss="0.1"', ""))
+    subject = make_subject(mjcf(path, "position", JOINTS, JOINTS, "tool"))
+    names = [each.name for each in base_parameters(subject)]
+    assert [name for name in names if "friction" in name] == ["friction_loss elbow"]

@@ -1,0 +1,75 @@
+"""Fits find what was planted."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shared.identification.base import base_parameters, enter_base
+from shared.identification.cmaes import minimize
+from shared.identification.dataset.types import Dataset
+from shared.identification.fit import polish
+from shared.identification.noise import Noise
+from shared.identification.problem import Problem
+from shared.identification.space import Space
+from shared.identification.subject import recorded_of, subject_of
+from tests.measured import measure
+
+PLANTED = {
+    "damping elbow": 0.4, "armature lift": -0.3, "kp pan": 0.2, "kp lift": -0.15,
+    "friction_loss elbow": 0.5,
+}  # fmt: skip
+
+
+def planted(folder: Path) -> Problem:
+    """Return data without noise of an arm with another base, and what is fitted: no priors."""
+    blank = measure(folder, np.random.default_rng(0), seconds=3.0)
+    subject = subject_of(blank)
+    parameters = tuple(
+        replace(each, prior=np.inf) for each in base_parameters(subject) if each.name in PLANTED
+    )
+    x = np.array([PLANTED[each.name] for each in parameters])
+    found = subject.nominal.run(
+        [(lambda row: enter_base(parameters, x, row), each) for each in recorded_of(blank)]
+    )
+    trajectories = tuple(
+        replace(trajectory, q=reports.q, tracker=reports.tracker)
+        for trajectory, reports in zip(blank.trajectories, found, strict=True)
+    )
+    dataset: Dataset = replace(blank, trajectories=trajectories)
+    noise = Noise(np.full(3, 1e-4), np.full(6, 1e-4), np.zeros(9), is_measured=True)
+    return Problem(subject, dataset, parameters, noise)
+
+
+@pytest.mark.parametrize("begins_at_bound", [False, True])
+def test_a_planted_base_is_found_to_one_percent(tmp_path: Path, begins_at_bound: bool):
+    problem = planted(tmp_path)
+    space = Space(problem)
+    start = np.zeros(space.size)
+    names = [each.name for each in problem.parameters]
+    if begins_at_bound:
+        friction = names.index("friction_loss elbow")
+        start[friction] = space.bounds[0][friction]
+        assert problem.parameters[friction].value(start[friction]) == 0.0
+    fit = polish(space, start, problem.of("train"), enough=1e-9)
+    for each, z in zip(problem.parameters, fit.z, strict=True):
+        assert each.value(z) == pytest.approx(each.value(PLANTED[each.name]), rel=0.01), each.name
+
+
+def test_cmaes_finds_the_bottom_of_a_bowl_within_bounds():
+    wanted = np.array([0.3, -0.2, 2.0])
+
+    def losses(zs: np.ndarray) -> np.ndarray:
+        return np.sum((zs - wanted) ** 2, axis=1)
+
+    low, high = np.full(3, -1.0), np.ones(3)
+    found = minimize(losses, np.zeros(3), low, high, sigma=0.3, seed=4, generations=60)
+    again = minimize(losses, np.zeros(3), low, high, sigma=0.3, seed=4, generations=60)
+    assert found == pytest.approx([0.3, -0.2, 1.0], abs=0.02)
+    assert np.array_equal(found, again)
+
+
+def test_nothing_to_search_is_found_at_once():
+    empty = np.zeros(0)
+    assert minimize(lambda zs: zs.sum(axis=1), empty, empty, empty, sigma=0.3, seed=1).size == 0

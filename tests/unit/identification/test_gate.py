@@ -1,0 +1,49 @@
+"""The gate: an interval that covers, and nothing passes that is not sure and enough."""
+
+import numpy as np
+import pytest
+
+from shared.identification.gate import Gain, compare, floor_of
+
+
+@pytest.mark.parametrize("count", [3, 8, 40])
+def test_an_interval_covers_the_truth_in_95_of_100_cases(count: int):
+    rng = np.random.default_rng(1)
+    hits = 0
+    for _ in range(400):
+        after = 1.0 + 0.2 * rng.standard_normal(count)
+        gain = compare(after + 0.5 + 0.3 * rng.standard_normal(count), after, rng)
+        hits += gain.low <= 0.5 <= gain.high
+    assert 0.92 <= hits / 400 <= 0.98
+
+
+def test_one_stretch_is_sure_of_nothing_however_much_is_taken_off():
+    gain = compare(np.array([100.0]), np.array([1.0]), np.random.default_rng(0))
+    assert gain.gain == 99.0
+    assert gain.low < 0.0 < gain.high
+    assert not gain.is_useful(100.0)
+
+
+def test_what_is_taken_off_everywhere_is_sure():
+    rng = np.random.default_rng(0)
+    gain = compare(np.full(12, 4.0), np.full(12, 1.5), rng)
+    assert (gain.loss, gain.before, gain.gain) == (1.5, 4.0, 2.5)
+    assert gain.low == gain.high == pytest.approx(2.5)
+    assert gain.share(4.0) == pytest.approx(2.5 / (4.0 - 1.15))
+    assert gain.is_useful(4.0)
+
+
+def test_a_cause_is_useful_only_if_it_is_sure_and_enough():
+    def gain(before: float, loss: float, surely: float) -> Gain:
+        return Gain(loss, before, 0.0, 0.0, surely, 0.1)
+
+    assert gain(3.0, 2.0, 0.5).is_useful(3.0)
+    assert not gain(3.0, 2.0, -0.01).is_useful(3.0)  # not sure
+    assert not gain(3.0, 2.95, 0.01).is_useful(3.0)  # 2.7 % of what can be explained
+    assert not gain(3.0, 2.0, 0.5).is_useful(100.0)  # 1 % of what could be explained
+    assert not gain(100.0, 99.0, 0.5).is_useful(10.0)  # 1 % of what is left
+
+
+def test_the_floor_is_always_below_the_base():
+    assert floor_of(10.0) == 1.15
+    assert floor_of(1.0) == pytest.approx(0.7)
