@@ -1,0 +1,47 @@
+"""No path names a cause that did not pass the gate, whatever the losses are."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from shared.identification.conclude import conclude
+from shared.identification.search import _simplest  # pyright: ignore[reportPrivateUsage]
+from tests.searches import DRAG, ELBOW, LIFT, Searches
+
+LOSSES = st.lists(st.floats(0.3, 300.0), min_size=6, max_size=6).map(np.array)
+
+
+@pytest.fixture(scope="module")
+def searches(tmp_path_factory: pytest.TempPathFactory) -> Searches:
+    return Searches(tmp_path_factory.mktemp("data"))
+
+
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(base=LOSSES, after=st.lists(LOSSES, min_size=3, max_size=3), doubted=st.booleans(),
+       is_event=st.booleans())  # fmt: skip
+def test_causes_are_named_only_if_they_passed(
+    searches: Searches, base: np.ndarray, after: list[np.ndarray], doubted: bool, is_event: bool
+):
+    tried = tuple(
+        searches.tried(candidate, base, losses, numbers, is_event and candidate is DRAG)
+        for candidate, losses, numbers in zip((ELBOW, LIFT, DRAG), after, (1, 1, 2), strict=True)
+    )
+    mean = float(base.mean())
+    useful = [each for each in tried if each.is_event or each.gain.is_useful(mean)]
+    names = ("mass elbow",) if doubted else ()
+    if useful:
+        taken, rivals = _simplest(useful, np.random.default_rng(0))
+        found = searches.search(base, taken, rivals, names, tried)
+    else:
+        found = searches.search(base, doubted=names, tried=tried)
+    told = conclude(found, ())
+    passed = {each.candidate.label for each in useful}
+    assert (told.word == "named") == bool(told.causes)
+    assert (told.word == "tie") == bool(told.ties)
+    for cause in (*told.causes, *(each for tie in told.ties for each in tie.causes)):
+        assert f"{cause.effect} {cause.where}" in passed
+        assert np.isfinite([cause.interval.low, cause.interval.high]).all()
+    if told.word in ("none", "base_too_coarse"):
+        assert not passed
+    assert set(found.tried) == {f"{each.effect} {each.where}" for each in told.candidates}

@@ -1,0 +1,74 @@
+"""Searches put together by hand, for tests of what is made of them."""
+
+from pathlib import Path
+
+import numpy as np
+
+from shared.identification.catalogue.torque_bias import EFFECT as BIAS
+from shared.identification.catalogue.viscous_friction import EFFECT as VISCOUS
+from shared.identification.dataset.types import Float64
+from shared.identification.effect import Candidate
+from shared.identification.fit import Fit, Start, polish
+from shared.identification.gate import compare
+from shared.identification.screen import Screened
+from shared.identification.search import Search, Tried
+from shared.identification.space import Space
+from tests.measured import measure, problem_of
+
+ELBOW, LIFT = Candidate(BIAS, "elbow"), Candidate(BIAS, "lift")
+DRAG = Candidate(VISCOUS, "elbow")
+
+
+class Searches:
+    """Makes searches of one small data set; only the losses are made up."""
+
+    def __init__(self, folder: Path) -> None:
+        self.problem = problem_of(measure(folder, np.random.default_rng(0), seconds=2.0))
+        self.base = self.fit(())
+        self._fits: dict[tuple[Candidate, ...], Fit] = {}
+
+    def fit(self, candidates: tuple[Candidate, ...]) -> Fit:
+        """Return the nominal arm with effects of half a probe."""
+        space = Space(self.problem, candidates)
+        z = np.zeros(space.size)
+        z[space.base_size :] = 0.5
+        return polish(space, z, self.problem.of("train"), steps=0)
+
+    def tried(
+        self, candidate: Candidate, before: Float64, after: Float64, numbers: int = 1,
+        is_event: bool = False,
+    ) -> Tried:  # fmt: skip
+        """Return a candidate that came from one loss to another."""
+        if (candidate,) not in self._fits:
+            self._fits[candidate,] = self.fit((candidate,))
+        fit = self._fits[candidate,]
+        signature = np.array([1.0, 0.0])
+        screened = Screened(candidate, np.ones(numbers), self.base.z, 0.5, signature)
+        gain = compare(before, after, np.random.default_rng(0))
+        return Tried(screened, fit, gain, after, is_event)
+
+    def search(
+        self, base: Float64, accepted: Tried | None = None, rivals: tuple[Tried, ...] = (),
+        doubted: tuple[str, ...] = (), tried: tuple[Tried, ...] = (),
+    ) -> Search:  # fmt: skip
+        """Return a search that is over."""
+        taken = () if accepted is None else (accepted,)
+        looked = (*taken, *rivals, *tried)
+        return Search(
+            problem=self.problem,
+            rng=np.random.default_rng(0),
+            candidates=(ELBOW, LIFT, DRAG),
+            ruled_out={},
+            doubted=doubted,
+            base=self.base,
+            nominal=Start(self.base.z, self.base.jacobian),
+            parts=self.base,
+            current=self.base if accepted is None else accepted.fit,
+            nominal_losses=base,
+            base_losses=base,
+            current_losses=base if accepted is None else accepted.losses,
+            screened={each.candidate.label: each.screened for each in looked},
+            tried={each.candidate.label: each for each in looked},
+            accepted=list(taken),
+            rivals=[rivals] if taken else [],
+        )

@@ -1,0 +1,87 @@
+"""Each word of the verdict, from searches put together by hand."""
+
+import numpy as np
+import pytest
+
+from shared.identification.conclude import conclude
+from shared.identification.verdict import Unexplained
+from tests.searches import DRAG, ELBOW, LIFT, Searches
+
+_BAD = np.linspace(8.0, 12.0, 8)
+_GOOD = np.linspace(1.0, 1.2, 8)
+_PUSH = Unexplained(
+    where="elbow", trajectory="first", begin=0.5, end=0.6, phase="once", size=0.01, unit="rad",
+    times_noise=9.0,
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def searches(tmp_path_factory: pytest.TempPathFactory) -> Searches:
+    return Searches(tmp_path_factory.mktemp("data"))
+
+
+def test_a_cause_that_leaves_little_more_than_noise_is_named(searches: Searches):
+    tried = searches.tried(ELBOW, _BAD, _GOOD)
+    found = conclude(searches.search(_BAD, tried), ())
+    assert found.word == "named"
+    (cause,) = found.causes
+    assert (cause.effect, cause.where, cause.unit) == ("torque_bias", "elbow", "N m")
+    assert cause.value == pytest.approx(0.5 * tried.fit.space.quantities[0].probe)
+    assert cause.interval.low < cause.value < cause.interval.high
+    assert found.held_out.base_fit == pytest.approx(np.sqrt(10.0))
+    assert found.held_out.extended == pytest.approx(np.sqrt(1.1))
+    assert "elbow" in found.sentence
+    assert not found.ties
+
+
+def test_a_base_at_the_noise_has_nothing_to_name(searches: Searches):
+    found = conclude(searches.search(_GOOD), ())
+    assert (found.word, found.causes, found.ties) == ("none", (), ())
+    assert found.held_out.share_removed == 0.0
+
+
+def test_what_happened_once_is_not_passed_over(searches: Searches):
+    assert conclude(searches.search(_GOOD), (_PUSH,)).word == "unexplained"
+
+
+def test_causes_that_do_as_well_are_a_tie(searches: Searches):
+    one, other = (searches.tried(each, _BAD, _GOOD) for each in (ELBOW, LIFT))
+    found = conclude(searches.search(_BAD, one, (other,)), ())
+    assert found.word == "tie"
+    assert found.causes == ()
+    (tie,) = found.ties
+    assert [cause.where for cause in tie.causes] == ["elbow", "lift"]
+    assert tie.alike == pytest.approx(1.0)
+    assert "one at a time" in tie.record
+    assert "torque bias of elbow or torque bias of lift" in found.sentence
+
+
+def test_much_that_no_effect_takes_off_is_unexplained(searches: Searches):
+    tried = searches.tried(ELBOW, _BAD, _BAD)
+    found = conclude(searches.search(_BAD, tried=(tried,)), (_PUSH,))
+    assert (found.word, found.causes) == ("unexplained", ())
+    assert "elbow once" in found.sentence
+    (scored,) = found.candidates
+    assert scored.why_not == "no better on held-out recordings"
+
+
+def test_a_cause_that_leaves_too_much_is_not_believed(searches: Searches):
+    half = 0.5 * _BAD
+    found = conclude(searches.search(_BAD, searches.tried(DRAG, _BAD, half)), ())
+    assert (found.word, found.causes) == ("unexplained", ())
+    assert "too much to believe" in found.sentence
+    assert "too much is left over" in found.candidates[0].why_not
+
+
+def test_links_far_from_what_is_known_of_them_make_the_base_too_coarse(searches: Searches):
+    found = conclude(searches.search(_BAD, doubted=("mass elbow",)), ())
+    assert (found.word, found.causes) == ("base_too_coarse", ())
+
+
+def test_the_base_is_told_before_and_after_within_its_bounds(searches: Searches):
+    found = conclude(searches.search(_BAD, searches.tried(ELBOW, _BAD, _GOOD)), ())
+    for told, each in zip(found.base, searches.problem.parameters, strict=True):
+        assert told.name == each.name
+        assert told.nominal == told.base_fit == told.extended == each.nominal
+        assert each.value(each.low) <= told.interval.low <= told.interval.high
+        assert told.interval.high <= each.value(each.high)
