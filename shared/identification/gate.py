@@ -98,7 +98,7 @@ def compare(before: Float64, after: Float64, rng: np.random.Generator) -> Gain:
         means = np.array([0.0, 2.0 * gain])
     low, high, surely = np.quantile(means, [0.025, 0.975, 0.005])
     free = max(count - 1, 1)
-    wider = float(stdtrit(free, 0.975) / ndtri(0.975)) * np.sqrt((free + 1) / free)
+    wider = float(stdtrit(free, 0.975) / ndtri(0.975) * np.sqrt((free + 1) / free))
     return Gain(
         loss=float(after.mean()),
         before=float(before.mean()),

@@ -189,6 +189,8 @@ def _round(
     """Look for one more cause; return whether there was one."""
     taken = {each.candidate for each in found.accepted}
     left = [each for each in found.candidates if each not in taken]
+    if not left:
+        return False
     progress("screen", 0.0, f"{len(left)} candidates")
     parts = found.parts.space.problem.of("train")
     screened = screen(found.parts, left, parts)

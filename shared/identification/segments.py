@@ -73,13 +73,14 @@ def _windows(index: int, trajectory: Trajectory, window: float, subject: Subject
     position = smooth(q, width)
     speed = smooth(q, width, period)
     starts = np.arange(at[0] + width * period, at[-1] - 0.5 * window, window)
+    ends = np.r_[starts[1:], starts[-1:] + window]  # no reading is of two parts
     # MuJoCo's Euler step takes the position with the speed after it: it is of second order if the
     # speed is given half a step before the position (Stormer and Verlet's method).
     before = starts - 0.5 * subject.plant.timestep
     states = list(zip(sampled(even, position, starts), sampled(even, speed, before), strict=True))
     return [
-        _part(index, trajectory, float(start), float(start) + window, state)
-        for start, state in zip(starts, states, strict=True)
+        _part(index, trajectory, float(start), float(end), state)
+        for start, end, state in zip(starts, ends, states, strict=True)
     ]
 
 

@@ -47,3 +47,10 @@ def test_parts_under_torque_control_replay_a_swing_to_the_second_order(
     )
     # A start half a step late is off by up to 25 rad/s^2 h/2 0.3 s: 7.5 and 15 mrad.
     assert off < 1e-3
+
+
+def test_no_reading_is_of_two_parts(tmp_path: Path):
+    dataset = _swinging(tmp_path, 0.002)
+    segments = segments_of(dataset, subject_of(dataset), 0.1)
+    at = np.concatenate([each.recorded.begin + each.recorded.joints_at for each in segments])
+    assert np.diff(at).min() > 1e-3
