@@ -1,0 +1,112 @@
+"""What is taken of several causes that pass, and a search as a whole."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from shared.identification.catalogue.torque_bias import EFFECT as BIAS
+from shared.identification.catalogue.torque_gain import EFFECT as GAIN
+from shared.identification.catalogue.viscous_friction import EFFECT as VISCOUS
+from shared.identification.dataset.types import Dataset
+from shared.identification.find import identify
+from shared.identification.hidden.generator import hide
+from shared.identification.hidden.recipe import Recipe, wish_of
+from shared.identification.progress import silent
+from shared.identification.search import _simplest, search  # pyright: ignore[reportPrivateUsage]
+from shared.identification.verdict import Verdict
+from tests.searches import DRAG, ELBOW, LIFT, Searches
+
+_BAD = np.linspace(8.0, 12.0, 8)
+_GOOD = np.linspace(1.0, 1.2, 8)
+
+
+@pytest.fixture(scope="module")
+def searches(tmp_path_factory: pytest.TempPathFactory) -> Searches:
+    return Searches(tmp_path_factory.mktemp("data"))
+
+
+def test_of_causes_that_do_as_well_the_one_of_fewer_numbers_is_taken(searches: Searches):
+    best = searches.tried(DRAG, _BAD, _GOOD, numbers=3)
+    simple = searches.tried(ELBOW, _BAD, _GOOD + 0.01)
+    taken, rivals = _simplest([best, simple], np.random.default_rng(0))
+    assert taken is simple
+    assert rivals == ()
+
+
+def test_causes_of_as_many_numbers_that_do_as_well_are_rivals(searches: Searches):
+    one = searches.tried(ELBOW, _BAD, _GOOD + 0.01)
+    other = searches.tried(LIFT, _BAD, _GOOD)
+    taken, rivals = _simplest([one, other], np.random.default_rng(0))
+    assert taken is other
+    assert rivals == (one,)
+
+
+def test_a_cause_that_does_surely_worse_is_no_rival_however_simple(searches: Searches):
+    best = searches.tried(DRAG, _BAD, _GOOD, numbers=3)
+    worse = searches.tried(ELBOW, _BAD, _GOOD + 2.0)
+    taken, rivals = _simplest([worse, best], np.random.default_rng(0))
+    assert taken is best
+    assert rivals == ()
+
+
+def test_a_search_without_a_candidate_is_over(searches: Searches):
+    found = searches.search(_BAD)
+    found.candidates = ()
+    search(found, silent)
+    assert found.accepted == []
+
+
+_opened: list[str] = []
+_is_watching = False
+
+
+def _watch(event: str, details: tuple[Any, ...]) -> None:
+    if _is_watching and event == "open":
+        _opened.append(str(details[0]))
+
+
+@contextmanager
+def watching() -> Iterator[None]:
+    """Take note of every file that Python opens; a hook stays for good, so it is switched."""
+    global _is_watching
+    _opened.clear()
+    _is_watching = True
+    try:
+        yield
+    finally:
+        _is_watching = False
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    sys.addaudithook(_watch)
+    folder = tmp_path_factory.mktemp("hidden") / "set"
+    wish = wish_of("torque_bias@elbow=0.4")
+    recipe = Recipe(arm="torque2", wishes=(wish,), seconds=2.5, train=2, test=1, seed=11)
+    return hide(folder, recipe)
+
+
+def steady(verdict: Verdict) -> bytes:
+    """Return a verdict without what a clock says."""
+    return msgspec.json.encode(msgspec.structs.replace(verdict, cpu_s=0.0, seconds={}))
+
+
+def test_the_same_seed_gives_the_same_verdict_and_the_truth_is_never_read(dataset: Dataset):
+    truth = dataset.folder / "truth.toml"
+    with watching():
+        truth.read_bytes()
+        assert str(truth) in _opened
+        _opened.clear()
+        first = identify(dataset, seed=5, catalogue=(BIAS, GAIN, VISCOUS)).verdict
+    assert _opened  # the model file, at least
+    assert not [path for path in _opened if "truth" in Path(path).name]
+    truth.unlink()
+    assert steady(identify(dataset, seed=5, catalogue=(BIAS, GAIN, VISCOUS)).verdict) == steady(
+        first
+    )
