@@ -117,7 +117,7 @@ def _held_out(found: Search) -> HeldOut:
         base_fit=float(np.sqrt(base)),
         extended=float(np.sqrt(found.current_losses.mean())),
         noise_floor=float(np.sqrt(floor_of(base))),
-        share_removed=gain.share(base) if found.accepted else 0.0,
+        share_removed=min(gain.share(base), 1.0) if found.accepted else 0.0,
         share_interval=Interval(low=low, high=high)
         if found.accepted
         else Interval(low=0.0, high=0.0),
@@ -228,7 +228,7 @@ def _scored(found: Search, word: Word) -> tuple[Scored, ...]:
         tried = found.tried.get(label)
         entry = Scored(effect=candidate.effect.name, where=candidate.place, screen=screened.share)
         if tried is None:
-            why = "explains too little at first sight" if label not in accepted else ""
+            why = "not among the best at first sight" if label not in accepted else ""
             out.append(_replaced(entry, why_not=why))
             continue
         quantity = candidate.effect.quantities(found.problem.subject, candidate.place)[0]
@@ -326,4 +326,5 @@ def _where(cause: Cause) -> str:
 
 def _size(cause: Cause) -> str:
     half = (cause.interval.high - cause.interval.low) / 2
-    return f"{cause.quantity} {cause.value:.3g} ± {half:.1g} {cause.unit}".rstrip()
+    unit = "" if cause.unit == "1" else f" {cause.unit}"
+    return f"{cause.quantity} {cause.value:.3g} ± {half:.1g}{unit}"

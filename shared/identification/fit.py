@@ -6,9 +6,12 @@ import numpy as np
 
 from shared.identification.cmaes import minimize
 from shared.identification.dataset.types import Float64
+from shared.identification.noise import Noise
 from shared.identification.space import Space
 
 _MAX_STEPS = 12
+_MEDIAN = 0.455
+"""Of the square of a normal number of variance 1."""
 WINDOW = 1.0
 """Of the parts that a fit begins with (s)."""
 _ENOUGH = 3e-3
@@ -117,6 +120,23 @@ class BaseFits:
     whole: Fit
 
 
+def floor_from_base(space: Space) -> Noise:
+    """Return a noise floor for recordings of which none is a repeat: what the base leaves.
+
+    How far below that a right model would come is not known, so causes are judged only by how
+    much better they are, not by what they leave.
+    """
+    parts = Space(space.problem.in_parts(WINDOW), space.candidates)
+    pieces = parts.problem.of("train")
+    fit = polish(parts, np.zeros(space.size), pieces, 4)
+    problem, noise = parts.problem, parts.problem.noise
+    found = np.concatenate(problem.residuals([parts.variant(fit.z)], pieces)[0])
+    scale = np.maximum(np.sqrt(np.median(found**2, axis=0) / _MEDIAN), 1.0)
+    count = len(noise.joints)
+    tracker = None if noise.tracker is None else noise.tracker * scale[count:]
+    return replace(noise, joints=noise.joints * scale[:count], tracker=tracker)
+
+
 @dataclass(frozen=True)
 class SavedFits:
     """What it takes to have a base fit again."""
@@ -131,7 +151,7 @@ class SavedFits:
 def fit_again(space: Space, saved: SavedFits) -> BaseFits:
     """Return a base fit that was found before."""
     problem = space.problem
-    parts = Space(problem.windowed(WINDOW), space.candidates)
+    parts = Space(problem.in_parts(WINDOW), space.candidates)
     origin, pieces = np.zeros(space.size), parts.problem.of("train")
     nominal = Start(origin, parts.jacobian(origin, pieces)[1])
     begun = _at(parts, np.array(saved.parts), pieces)
@@ -154,7 +174,7 @@ def fit_base(space: Space, rng: np.random.Generator) -> BaseFits:
     """
     problem = space.problem
     segments = problem.of("train")
-    parts = Space(problem.windowed(WINDOW), space.candidates)
+    parts = Space(problem.in_parts(WINDOW), space.candidates)
     origin = np.zeros(space.size)
     pieces = parts.problem.of("train")
     residual, jacobian = parts.jacobian(origin, pieces)

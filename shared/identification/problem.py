@@ -62,6 +62,11 @@ class Problem:
             tracker = None if recorded.tracker_at is None else _Bins.of(recorded.tracker_at)
             self._bins[index] = (_Bins.of(recorded.joints_at), tracker)
 
+    def in_parts(self, longest: float) -> "Problem":
+        """Return :meth:`windowed`, no longer than what the problem has already."""
+        is_short = all(segment.recorded.joints_at[-1] <= longest for segment in self.segments)
+        return self if is_short else self.windowed(longest)
+
     def windowed(self, window: float) -> "Problem":
         """Return the same with recordings in parts that each start from the measured state."""
         return Problem(

@@ -104,14 +104,40 @@ def _descend(
     found = space.residual(starts, segments)
     costs = 0.5 * np.sum(found**2, axis=1)
     best = int(np.argmin(costs))
-    z, residual, cost = starts[best], found[best], float(costs[best])
+    z, residual = starts[best], found[best]
     _, own = space.jacobian(z, segments, range(known, space.size))
     rows = len(residual) - space.size
     base = np.zeros((len(residual), known))
     base[:rows] = kept[:, :known]
     base[rows : rows + known] = np.diag(1.0 / space.priors[:known])
     jacobian = np.concatenate([base, own], axis=1)
-    damping = 1e-1
+    down = _go_down(space, z, residual, jacobian, segments)
+    return down.z, down.cost
+
+
+def settle(space: Space, start: Float64, segments: tuple[int, ...]) -> Fit:
+    """Return a fit from one true derivative, mended as it goes: enough to judge, not to report.
+
+    Twice, where the second derivative still finds something.
+    """
+    z = space.clip(start)
+    found = None
+    for _ in range(2):
+        residual, jacobian = space.jacobian(z, segments)
+        before = 0.5 * float(residual @ residual)
+        found = _go_down(space, z, residual, jacobian, segments)
+        z = found.z
+        if found.cost > before * (1 - _ENOUGH):
+            break
+    assert found is not None
+    return found
+
+
+def _go_down(
+    space: Space, z: Float64, residual: Float64, jacobian: Float64, segments: tuple[int, ...]
+) -> Fit:
+    """Take damped steps with a derivative that is mended after each (Broyden 1965)."""
+    cost, damping = 0.5 * float(residual @ residual), 1e-1
     for _ in range(_ITERATIONS):
         dampings = [damping * factor for factor in _DAMPINGS]
         tries = damped(space, z, residual, jacobian, dampings)
@@ -121,7 +147,8 @@ def _descend(
         moved = tries[best] - z
         length = float(moved @ moved)
         if length > 1e-12:
-            jacobian += np.outer(found[best] - residual - jacobian @ moved, moved) / length
+            off = found[best] - residual - jacobian @ moved
+            jacobian = jacobian + np.outer(off, moved) / length
         if costs[best] >= cost:
             damping *= 100.0
             continue
@@ -130,4 +157,4 @@ def _descend(
         damping = max(dampings[best], 1e-4)
         if is_enough:
             break
-    return z, cost
+    return Fit(space, z, residual, jacobian, cost)

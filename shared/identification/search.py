@@ -8,12 +8,20 @@ import numpy as np
 from shared.identification.base import INERTIA_PRIOR, BaseParameter, base_parameters
 from shared.identification.dataset.types import Dataset, Float64
 from shared.identification.effect import Candidate, Effect
-from shared.identification.fit import Fit, SavedFits, Start, fit_again, fit_base, polish
+from shared.identification.fit import (
+    Fit,
+    SavedFits,
+    Start,
+    fit_again,
+    fit_base,
+    floor_from_base,
+    polish,
+)
 from shared.identification.gate import Gain, compare, stretches
 from shared.identification.noise import noise_of
 from shared.identification.problem import BLOCK, Problem
 from shared.identification.progress import Progress
-from shared.identification.refit import Rough, refit
+from shared.identification.refit import Rough, refit, settle
 from shared.identification.screen import Screened, candidates_of, screen
 from shared.identification.space import Space
 from shared.identification.subject import subject_of
@@ -125,6 +133,10 @@ def begin(
     known = base_parameters(subject)
     if fits is not None and not {each.name for each in known} >= set(fits.names):
         fits = None
+    problem = Problem(subject, dataset, known, noise)
+    if not noise.is_measured:
+        progress("noise floor", 0.5, "no repeats: from what the base leaves")
+        noise = floor_from_base(Space(problem))
     if fits is not None:
         known = tuple(each for each in known if each.name in fits.names)
     problem = Problem(subject, dataset, known, noise)
@@ -208,7 +220,7 @@ def _round(
             break
         progress("decide", len(tried) / _FULL, each.screened.candidate.label)
         space = Space(found.problem, each.space.candidates)
-        fit = polish(space, each.z, train, 4)
+        fit = settle(space, each.z, train)
         losses = stretches(found.problem, space.variant(fit.z), test)
         gain = compare(found.current_losses, losses, found.rng)
         is_event = _explains_event(found, each.screened.candidate, fit, train)
@@ -221,7 +233,7 @@ def _round(
         return False
     best, rivals = _simplest(useful, found.rng)
     rivals = tuple(one for one in rivals if not _adds(found, best, one, train, test))
-    fit = polish(best.fit.space, best.fit.z, train, 6, enough=1e-4)
+    fit = polish(best.fit.space, best.fit.z, train, 4, enough=1e-4)
     losses = stretches(found.problem, fit.space.variant(fit.z), test)
     gain = compare(found.current_losses, losses, found.rng)
     if gain.loss <= best.gain.loss and (best.is_event or gain.is_useful(base)):
@@ -232,7 +244,7 @@ def _round(
     if rivals:
         return False
     space = Space(found.parts.space.problem, best.fit.space.candidates)
-    found.parts = polish(space, best.fit.z, parts, 3)
+    found.parts = polish(space, best.fit.z, parts, 2)
     return True
 
 
@@ -286,7 +298,7 @@ def _adds(
     space = best.fit.space.grown(other.candidate)
     size = other.numbers
     starts = [np.r_[best.fit.z, share * other.fit.z[-size:]] for share in (0.5, 0.1)]
-    fits = [polish(space, space.clip(start), train, 4) for start in starts]
+    fits = [settle(space, space.clip(start), train) for start in starts]
     fit = min(fits, key=lambda one: one.cost)
     losses = stretches(found.problem, space.variant(fit.z), test)
     return compare(best.losses, losses, found.rng).is_useful(float(found.base_losses.mean()))

@@ -6,6 +6,9 @@ from shared.identification.subject import Subject
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure
 
+_GRAVITY = 9.81
+"""m/s^2."""
+
 
 class Payload:
     """A point mass at the tool's centre of mass."""
@@ -28,9 +31,14 @@ class Payload:
         return ()
 
     def enter(self, row: Row, place: str, values: Float64) -> None:
-        """Make the tool's body heavier, its radius of gyration unchanged."""
+        """Make the tool's body heavier, its radius of gyration unchanged.
+
+        The springs of a counterbalanced arm do not know of it: there its weight pulls by itself.
+        """
         body = row.tool_body()
         mass = row.field("body_mass")
+        if row.is_weightless:
+            row.weights[body] = _GRAVITY * float(values[0])
         grown = (mass[body] + float(values[0])) / mass[body]
         row.field("body_inertia")[body] *= grown
         mass[body] *= grown

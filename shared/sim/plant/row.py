@@ -127,6 +127,8 @@ class Row:
         default_factory=dict[str, Callable[[float], float]]
     )
     fed: list[Signal] = dataclasses.field(default_factory=list[Signal])
+    weights: dict[int, float] = dataclasses.field(default_factory=dict[int, float])
+    """Weight (N) by body, of what nothing balances on an arm that is weightless otherwise."""
     fields: dict[str, Float64] = dataclasses.field(default_factory=dict[str, Float64])
 
     def field(self, name: str) -> Float64:
@@ -139,6 +141,12 @@ class Row:
     def current(self, name: str) -> Float64:
         """Return a field as it is by now, not to be changed."""
         return self.fields[name] if name in self.fields else getattr(self.model, name)
+
+    @property
+    def is_weightless(self) -> bool:
+        """Whether gravity moves nothing of the arm."""
+        off = int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+        return bool(self.model.opt.disableflags & off) or not self.model.opt.gravity.any()
 
     def dof(self, label: str) -> int:
         """Return the index of a logged joint's velocity in the model."""

@@ -46,8 +46,10 @@ def as_if_at(row: Row, target: Signal, believed: Signal, true: Signal) -> Signal
     row.feed(Signal(at - 0.5 * _PERIOD, left))
     shift = _way(given, _moved(tool, (wrench + damping * speed) / stiffness))
     steps: Float64 = np.arange(0.0, row.duration + row.plant.timestep, row.plant.timestep)
-    held = target.mean(steps, row.plant.timestep)
-    return Signal(steps, _moved(held, sampled(at, shift, steps)))
+    # Commands count from half a step before (see Rollouts); the shift is of the posture now.
+    before: Float64 = steps - 0.5 * row.plant.timestep
+    held = target.mean(before, row.plant.timestep)
+    return Signal(before, _moved(held, sampled(at, shift, steps)))
 
 
 def _mean(target: Signal, at: Float64) -> Float64:
