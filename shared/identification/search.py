@@ -27,13 +27,13 @@ from shared.identification.space import Space
 from shared.identification.subject import subject_of
 
 MOST_CAUSES = 4
-_TRIED = 8
+_TRIED = 6
 """Candidates that are refitted with the base's derivative kept."""
-_FULL = 5
+_FULL = 4
 """Of these, candidates that get a full fit."""
 _PER_EFFECT = 3
 """Places of one effect among those tried."""
-_SLIGHT = 0.015
+_SLIGHT = 0.03
 """Of the training residual: what explains less at first sight is not refitted."""
 _SLIGHT_BESIDE = 0.1
 """The same, as a share of what the best one explains."""
