@@ -188,7 +188,8 @@ def search(found: Search, progress: Progress) -> None:
     """Look for causes, one after another, until none passes or one is not told from others."""
     train, test = found.problem.of("train"), found.problem.of("test")
     for _ in range(MOST_CAUSES):
-        is_done = found.accepted and found.current_losses.mean() < QUIET
+        is_floor = found.problem.noise.is_measured
+        is_done = found.accepted and is_floor and found.current_losses.mean() < QUIET
         if is_done or not _round(found, train, test, progress):
             break
     if len(found.accepted) > 1:
