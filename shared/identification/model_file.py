@@ -96,6 +96,10 @@ def _pr2_file(
         if not entry.structure and changed <= {"fields"} and touched <= FIELDS:
             native.append(entry)
             carried.append(_said(entry, True, f"as {_words(touched)} of the arm"))
+        elif not entry.structure and changed <= {"fields", "weights"} and touched <= FIELDS:
+            native.append(entry)
+            said = f"its inertia as {_words(touched)} of the arm; its weight the file cannot hold"
+            carried.append(_said(entry, False, said))
         elif entry.effect.name == "command_latency":
             delay += float(entry.values[0])
             carried.append(_said(entry, True, "as command.delay"))

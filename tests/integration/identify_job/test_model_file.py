@@ -55,7 +55,6 @@ def written(folder: Path, file: ModelFile, dataset: Dataset) -> Dataset:
 
 PR2_CAUSES = (
     cause("command_latency", "", "delay", 0.03),
-    cause("payload", "", "mass", 0.4),
     cause("torque_bias", "shoulder_lift", "torque", 2.5),
     cause("joint_spring", "elbow_flex", "stiffness", 3.0, rest=-1.0),
     cause("nonlinear_viscous", "elbow_flex", "quadratic", 0.8),
@@ -73,6 +72,21 @@ def test_the_file_of_a_pr2_moves_as_its_extended_model(tmp_path: Path, named: Ca
     found = moved(written(tmp_path, file, dataset))
     assert np.abs(wanted - plain).max() > 5e-3
     np.testing.assert_allclose(found, wanted, atol=1e-6)
+
+
+def test_of_a_payload_on_a_balanced_arm_the_file_has_the_inertia_and_says_so(
+    tmp_path: Path,
+) -> None:
+    dataset = pr2_dataset(tmp_path)
+    payload = cause("payload", "", "mass", 0.4)
+    file = model_file(dataset, verdict_of(dataset, payload))
+    assert [each.is_carried for each in file.carried] == [False]
+    assert "its weight the file cannot hold" in file.carried[0].sentence
+    with_it = load_parameters(written(tmp_path, file, dataset).source.parameters)
+    without = load_parameters(
+        written(tmp_path, model_file(dataset, verdict_of(dataset)), dataset).source.parameters
+    )
+    assert with_it.extensions != without.extensions or with_it.bat.mass > without.bat.mass
 
 
 def test_train_and_play_load_the_file_of_a_pr2(tmp_path: Path) -> None:
