@@ -75,6 +75,8 @@ def missing_torques(
     for index in range(len(q)):
         data.qpos[places], data.qvel[dofs] = q[index], qd[index]
         data.ctrl[columns] = command[index]
-        mujoco.mj_forward(model, data)
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        mujoco.mj_fwdActuation(model, data)
         given[index] = data.qfrc_actuator[dofs]
     return inverse_dynamics(plant, model, q, qd, qdd) - given

@@ -2,10 +2,10 @@
 
 import copy
 
-import mujoco
 import numpy as np
 
 from shared.sim.arm import Float64
+from shared.sim.plant.inverse import missing_torques
 from shared.sim.plant.row import Row
 
 
@@ -27,28 +27,4 @@ def missing_torque(row: Row, at: Float64, q: Float64, qd: Float64, qdd: Float64)
         owner = model.opt if name.startswith("opt.") else model
         field = getattr(owner, name.removeprefix("opt."))
         field[...] = values.reshape(np.shape(field))
-    data = mujoco.MjData(model)
-    joints = [model.joint(name) for name in row.plant.joints]
-    places = np.array([int(joint.qposadr[0]) for joint in joints])
-    dofs = np.array([int(joint.dofadr[0]) for joint in joints])
-    columns = np.concatenate([_controls(model, name) for name in row.plant.actuators])
-    commands = row.command.held(at)
-    out = np.empty_like(q)
-    for index in range(len(at)):
-        data.qpos[places], data.qvel[dofs] = q[index], qd[index]
-        data.ctrl[columns] = commands[index]
-        mujoco.mj_fwdPosition(model, data)
-        mujoco.mj_fwdVelocity(model, data)
-        mujoco.mj_fwdActuation(model, data)
-        driven = data.qfrc_actuator[dofs].copy()
-        data.qacc[dofs] = qdd[index]
-        mujoco.mj_inverse(model, data)
-        out[index] = data.qfrc_inverse[dofs] - driven
-    return out
-
-
-def _controls(model: mujoco.MjModel, name: str) -> np.ndarray:
-    """Return which of the model's controls are an actuator's."""
-    actuator = int(model.actuator(name).id)
-    first = int(model.actuator_ctrladr[actuator])
-    return np.arange(first, first + int(model.actuator_ctrlnum[actuator]))
+    return missing_torques(row.plant, model, q, qd, qdd, row.command.held(at))
