@@ -3,9 +3,7 @@
 # pyright: basic
 # (pyarrow's types are partial)
 
-import contextlib
 import os
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -15,8 +13,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import tomli_w
 
-from shared.errors import IdentificationError
 from shared.identification.dataset.checks import is_too_large
+from shared.identification.dataset.folders import model_table, whole_folder
 from shared.identification.dataset.manifest import FILE, SCHEMA
 from shared.identification.dataset.reading import NANO, read_dataset
 from shared.identification.dataset.tables import TIME
@@ -54,11 +52,7 @@ def write_dataset(
         if min(each.command_at[0], each.joints_at[0]) != 0.0:
             raise ValueError(f"trajectory {each.name!r} does not begin at 0")
     folder = folder.absolute()
-    temporary = folder.with_name(f".{folder.name}.{os.getpid()}.tmp")
-    try:
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            raise IdentificationError(f"{folder} is already there: name a new folder")
-        temporary.mkdir(parents=True)
+    with whole_folder(folder) as temporary:
         for name, data in (files or {}).items():
             _write(temporary / name, data)
         for each in dataset.trajectories:
@@ -70,25 +64,9 @@ def write_dataset(
         _write(temporary / FILE, manifest.encode())
         sync_folder(temporary)
         read_dataset(temporary)
-        os.replace(temporary, folder)
-        sync_folder(folder.parent)
-    except OSError as error:
-        raise IdentificationError(f"cannot write {folder}: {error.strerror or error}") from error
-    finally:
-        with contextlib.suppress(OSError):
-            shutil.rmtree(temporary)
 
 
 def _manifest(dataset: Dataset, folder: Path, generator: Mapping[str, Any]) -> dict[str, Any]:
-    source = dataset.source
-    model: dict[str, Any] = {"kind": source.kind}
-    if source.kind == "pr2":
-        model["arm"] = source.arm
-    for key, path in (("path", source.path), ("parameters", source.parameters)):
-        if path is not None:
-            model[key] = os.path.relpath(path.absolute(), folder)
-    if source.tracked:
-        model["tracked"] = source.tracked
     wide = [
         joint for index, joint in enumerate(dataset.joints)
         if any(is_too_large(each.q[:, index]) for each in dataset.trajectories)
@@ -97,7 +75,7 @@ def _manifest(dataset: Dataset, folder: Path, generator: Mapping[str, Any]) -> d
         "schema": SCHEMA,
         "control": dataset.control,
         **({"continuous": wide} if wide else {}),
-        "model": model,
+        "model": model_table(dataset.source, folder),
         "generator": dict(generator),
         "trajectory": [_entry(each, dataset.joints) for each in dataset.trajectories],
     }

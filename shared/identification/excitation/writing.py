@@ -3,9 +3,6 @@
 # pyright: basic
 # (pyarrow's types are partial)
 
-import contextlib
-import os
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -15,18 +12,18 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import tomli_w
 
-from shared.errors import IdentificationError
+from shared.identification.dataset.folders import model_table, whole_folder
 from shared.identification.dataset.manifest import FILE, SCHEMA
+from shared.identification.dataset.reading import NANO
 from shared.identification.dataset.tables import TIME
 from shared.identification.dataset.types import Trajectory
 from shared.identification.excitation.prediction import Prediction
 from shared.identification.excitation.programme import SHOWS, Programme
-from shared.runtime.files import atomic_write, sync_folder
+from shared.runtime.files import atomic_write
 
 PROGRAMME_FILE: Final = "programme.toml"
 PICTURE_FILE: Final = "programme.png"
 COMMAND_FILE: Final = "command.parquet"
-_NANO: Final = 1_000_000_000
 
 
 def write_programme(
@@ -52,11 +49,7 @@ def write_programme(
         IdentificationError: the folder is not empty, or cannot be written.
     """
     folder = folder.absolute()
-    temporary = folder.with_name(f".{folder.name}.{os.getpid()}.tmp")
-    try:
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            raise IdentificationError(f"{folder} is already there: name a new folder")
-        temporary.mkdir(parents=True)
+    with whole_folder(folder) as temporary:
         for each in programme.predicted.trajectories:
             (temporary / each.name).mkdir()
             table = _table(each, programme.predicted.actuators)
@@ -66,17 +59,10 @@ def write_programme(
         atomic_write(temporary / PROGRAMME_FILE, made.encode())
         manifest = tomli_w.dumps(_manifest(programme, folder, generator))
         atomic_write(temporary / FILE, manifest.encode())
-        os.replace(temporary, folder)
-        sync_folder(folder.parent)
-    except OSError as error:
-        raise IdentificationError(f"cannot write {folder}: {error.strerror or error}") from error
-    finally:
-        with contextlib.suppress(OSError):
-            shutil.rmtree(temporary)
 
 
 def _table(each: Trajectory, columns: tuple[str, ...]) -> bytes:
-    arrays = {TIME: pa.array(np.round(each.command_at * _NANO).astype(np.int64))}
+    arrays = {TIME: pa.array(np.round(each.command_at * NANO).astype(np.int64))}
     for name, values in zip(columns, each.command.T, strict=True):
         arrays[name] = pa.array(np.ascontiguousarray(values))
     sink = pa.BufferOutputStream()
@@ -86,15 +72,6 @@ def _table(each: Trajectory, columns: tuple[str, ...]) -> bytes:
 
 def _manifest(programme: Programme, folder: Path, generator: Mapping[str, Any]) -> dict[str, Any]:
     dataset = programme.predicted
-    source = dataset.source
-    model: dict[str, Any] = {"kind": source.kind}
-    if source.kind == "pr2":
-        model["arm"] = source.arm
-    for key, path in (("path", source.path), ("parameters", source.parameters)):
-        if path is not None:
-            model[key] = os.path.relpath(path.absolute(), folder)
-    if source.tracked:
-        model["tracked"] = source.tracked
     entries: list[dict[str, Any]] = []
     for each in dataset.trajectories:
         entry: dict[str, Any] = {"name": each.name, "split": each.split}
@@ -104,7 +81,7 @@ def _manifest(programme: Programme, folder: Path, generator: Mapping[str, Any]) 
     return {
         "schema": SCHEMA,
         "control": dataset.control,
-        "model": model,
+        "model": model_table(dataset.source, folder),
         "generator": dict(generator),
         "trajectory": entries,
     }
