@@ -24,12 +24,12 @@ def half_widths(fit: Fit, segments: tuple[int, ...]) -> Float64:
         fit: on the recordings ``segments``.
         segments: in the order in which the fit had them.
     """
-    parts = fit.space.problem.residuals([fit.space.variant(fit.z)], segments)[0]
+    problem = fit.space.problem
     size = round(STRETCH / BLOCK)
     bread = np.asarray(np.linalg.pinv(fit.jacobian.T @ fit.jacobian), np.float64)
     scores: list[Float64] = []
     begin = 0
-    for rows, channels in (part.shape for part in parts):
+    for rows, channels in map(problem.shape_of, segments):
         count = max(rows // size, 1)
         for index in range(count):  # as np.array_split does
             end = begin + (rows // count + (index < rows % count)) * channels

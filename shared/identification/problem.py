@@ -1,5 +1,6 @@
 """Variants of the model against the recordings: residuals in units of the noise floor."""
 
+import math
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -126,13 +127,17 @@ class Problem:
             for reports in self.reports(variants, segments)
         ]
 
-    def size_of(self, segment: int) -> int:
-        """Return how many numbers of :meth:`vector` are a segment's."""
+    def shape_of(self, segment: int) -> tuple[int, int]:
+        """Return the shape of a segment's :meth:`residuals`: blocks, channels."""
         of_joints, of_tracker = self._bins[segment]
         rows, channels = len(of_joints.starts), len(self.noise.joints)
         if of_tracker is not None and self.noise.tracker is not None:
             rows, channels = min(rows, len(of_tracker.starts)), channels + len(self.noise.tracker)
-        return rows * channels
+        return rows, channels
+
+    def size_of(self, segment: int) -> int:
+        """Return how many numbers of :meth:`vector` are a segment's."""
+        return math.prod(self.shape_of(segment))
 
     def vector(self, variants: Sequence[Variant], segments: Sequence[int]) -> Float64:
         """Return float64[V, M]: the residuals of each variant in one row."""

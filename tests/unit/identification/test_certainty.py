@@ -7,26 +7,22 @@ import numpy as np
 import pytest
 
 from shared.identification.certainty import half_widths
-from shared.identification.dataset.types import Float64
 from shared.identification.fit import Fit
 
 
 @dataclass
 class Line:
-    """Stands in for a space and its problem: residuals that are linear in z."""
+    """Stands in for a space and its problem, of one recording."""
 
-    noise: Float64
-    """float64[B, C]."""
+    shape: tuple[int, int]
+    """Blocks, channels."""
 
     @property
     def problem(self) -> "Line":
         return self
 
-    def variant(self, z: Float64) -> Float64:
-        return z
-
-    def residuals(self, variants: Any, segments: Any) -> list[list[Float64]]:
-        return [[self.noise]]
+    def shape_of(self, segment: int) -> tuple[int, int]:
+        return self.shape
 
 
 @pytest.mark.parametrize(("stretches", "numbers"), [(8, 2), (16, 8), (16, 14)])
@@ -43,7 +39,7 @@ def test_intervals_cover_though_residuals_correlate(stretches: int, numbers: int
         z = -np.linalg.lstsq(jacobian, noise.ravel(), rcond=None)[0]
         residual = noise.ravel() + jacobian @ z
         padding = np.zeros((numbers, numbers))
-        fit = Fit(cast(Any, Line(noise)), z, np.r_[residual, np.zeros(numbers)],
+        fit = Fit(cast(Any, Line((rows, channels))), z, np.r_[residual, np.zeros(numbers)],
                   np.concatenate([jacobian, padding]), 0.0)  # fmt: skip
         covered.append(np.mean(np.abs(z) <= half_widths(fit, (0,))))
     assert 0.91 <= np.mean(covered) <= 0.99
