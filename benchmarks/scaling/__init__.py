@@ -1,0 +1,1 @@
+"""How many actors a run can use: a model, what measures its coefficients, what checks it."""
