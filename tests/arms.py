@@ -10,7 +10,7 @@ import numpy as np
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Effect
 from shared.identification.subject import Subject
-from shared.sim.plant.plant import Plant, mjcf
+from shared.sim.plant.plant import Plant, is_weightless, mjcf
 from shared.sim.plant.rollouts import Recorded, Reports, Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal
@@ -81,10 +81,9 @@ def make_subject(plant: Plant, has_tracker: bool = True) -> Subject:
         plant=plant,
         nominal=nominal,
         has_tracker=has_tracker,
-        has_gravity=not nominal.is_weightless,
+        has_gravity=not is_weightless(nominal.model),
         trajectories=("slow", "fast"),
         duration=10.0,
-        command_period=0.01,
         travel=np.full(count, 1.0),
         lowest=np.full(count, -0.5),
         speed=np.full(count, 1.0),

@@ -11,7 +11,7 @@ from shared.identification.motion import motion_of
 from shared.identification.ripples import ripples_of
 from shared.identification.slips import slip_of
 from shared.sim.plant.inverse import inverse_dynamics
-from shared.sim.plant.plant import Control, Plant, mjcf, pr2
+from shared.sim.plant.plant import Control, Plant, is_weightless, mjcf, pr2
 from shared.sim.plant.rollouts import Recorded, Rollouts
 from shared.sim.plant.signals import Signal
 
@@ -32,8 +32,6 @@ class Subject:
     """Names."""
     duration: float
     """Of the longest trajectory (s)."""
-    command_period: float
-    """Median (s)."""
     travel: Float64
     """float64[J], range of each joint over all trajectories (rad, m)."""
     lowest: Float64
@@ -108,15 +106,13 @@ def subject_of(dataset: Dataset, capacity: int = 128) -> Subject:
             for each in motions
         ]
     )  # fmt: skip
-    periods = np.concatenate([np.diff(each.command_at) for each in dataset.trajectories])
     return Subject(
         plant=plant,
         nominal=nominal,
         has_tracker=dataset.has_tracker,
-        has_gravity=not nominal.is_weightless,
+        has_gravity=not is_weightless(nominal.model),
         trajectories=tuple(each.name for each in dataset.trajectories),
         duration=max(each.duration for each in dataset.trajectories),
-        command_period=float(np.median(periods)) if len(periods) else 0.01,
         travel=np.ptp(q, axis=0),
         lowest=q.min(axis=0),
         speed=np.quantile(np.abs(speeds), 0.98, axis=0),

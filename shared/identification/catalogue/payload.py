@@ -3,6 +3,7 @@
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
 from shared.identification.subject import Subject
+from shared.sim.plant.plant import is_weightless
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure
 
@@ -37,7 +38,7 @@ class Payload:
         """
         body = row.tool_body()
         mass = row.field("body_mass")
-        if row.is_weightless:
+        if is_weightless(row.model):
             row.weights[body] = _GRAVITY * float(values[0])
         grown = (mass[body] + float(values[0])) / mass[body]
         row.field("body_inertia")[body] *= grown

@@ -89,6 +89,12 @@ def pr2(
     )
 
 
+def is_weightless(model: mujoco.MjModel) -> bool:
+    """Return whether gravity moves nothing of an arm."""
+    off = int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+    return bool(model.opt.disableflags & off) or not model.opt.gravity.any()
+
+
 def mjcf(
     path: Path, control: Control, joints: Sequence[str], actuators: Sequence[str], tracked: str
 ) -> Plant:

@@ -99,12 +99,6 @@ class Rollouts:
         adr = int(self.model.sensor(f"{TOOL}/position").adr[0])
         self._tool = slice(adr, adr + 7)
 
-    @property
-    def is_weightless(self) -> bool:
-        """Whether gravity moves nothing of the arm."""
-        off = int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
-        return bool(self.model.opt.disableflags & off) or not self.model.opt.gravity.any()
-
     def run(self, work: Sequence[tuple[Entry, Recorded]]) -> list[Reports]:
         """Replay recordings, each on an arm of its own; any number of them."""
         # A batch goes on until its longest recording ends, so alike ones go together.

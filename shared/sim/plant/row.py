@@ -142,12 +142,6 @@ class Row:
         """Return a field as it is by now, not to be changed."""
         return self.fields[name] if name in self.fields else getattr(self.model, name)
 
-    @property
-    def is_weightless(self) -> bool:
-        """Whether gravity moves nothing of the arm."""
-        off = int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
-        return bool(self.model.opt.disableflags & off) or not self.model.opt.gravity.any()
-
     def dof(self, label: str) -> int:
         """Return the index of a logged joint's velocity in the model."""
         return int(self.model.joint(self.plant.mj_joint(label)).dofadr[0])
