@@ -36,11 +36,6 @@ class Fit:
     """Half the sum of squares."""
     starts_agree: bool = True
 
-    @property
-    def covariance(self) -> Float64:
-        """Return float64[n, n], of z, for a noise of 1 (what correlates is widened elsewhere)."""
-        return np.asarray(np.linalg.pinv(self.jacobian.T @ self.jacobian), np.float64)
-
 
 def polish(
     space: Space,

@@ -48,8 +48,6 @@ class Problem:
     noise: Noise
     window: float | None = None
     """Length of the parts that are replayed (s); None for as long as they come."""
-    rollouts: int = 0
-    """Arms simulated so far."""
     segments: tuple[Segment, ...] = field(init=False)
     _structures: dict[Structure, Rollouts] = field(default_factory=dict[Structure, Rollouts])
     _bins: dict[int, tuple["_Bins", "_Bins | None"]] = field(init=False)
@@ -107,7 +105,6 @@ class Problem:
                 for segment in segments
             ]
             found = self._structures[structure].run(work)
-            self.rollouts += len(work)
             for position, index in enumerate(members):
                 out[index] = found[position * len(segments) : (position + 1) * len(segments)]
         return out

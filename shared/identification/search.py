@@ -130,7 +130,7 @@ def begin(
     progress("noise floor", 0.0)
     subject = subject_of(dataset)
     noise = noise_of(dataset, BLOCK)
-    known = base_parameters(subject)
+    released = known = base_parameters(subject)
     if fits is not None and not {each.name for each in known} >= set(fits.names):
         fits = None
     problem = Problem(subject, dataset, known, noise)
@@ -160,11 +160,7 @@ def begin(
         rng=np.random.default_rng([seed, 1]),
         candidates=candidates,
         ruled_out=ruled_out,
-        doubted=tuple(
-            each.name
-            for each in base_parameters(subject)
-            if each.name not in {other.name for other in problem.parameters}
-        ),
+        doubted=tuple(each.name for each in released if each not in problem.parameters),
         base=done.whole,
         nominal=done.nominal,
         parts=done.parts,
