@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from shared.errors import RiposteError
 from shared.telemetry.recording import APPLICATION
 from shared.telemetry.rrd import RecordingFile, compact
+from shared.telemetry.scene import Fixed
 
 Floats = NDArray[np.float64]
 TIME = "time"
@@ -46,37 +47,12 @@ CURVES_SHOWN = 6
 """Joints that are not in a tab behind."""
 
 
-class Solid(Protocol):
-    """A solid fixed to a body; the simulator's fits as it is."""
-
-    @property
-    def body(self) -> int:
-        """Return the index of the body that carries it."""
-        ...
+class Solid(Fixed, Protocol):
+    """A primitive or a mesh; the simulator's fits as it is."""
 
     @property
     def kind(self) -> str:
         """Return what it is; long ones lie along their own z."""
-        ...
-
-    @property
-    def size(self) -> Sequence[float]:
-        """Return half extents, or radius and half length, or the radius (m)."""
-        ...
-
-    @property
-    def position(self) -> Sequence[float]:
-        """Return its centre in the body's frame (m)."""
-        ...
-
-    @property
-    def quaternion(self) -> Sequence[float]:
-        """Return its orientation in the body's frame, w x y z."""
-        ...
-
-    @property
-    def rgba(self) -> Sequence[float]:
-        """Return red, green, blue, opacity, each in 0..1."""
         ...
 
     @property

@@ -21,22 +21,17 @@ JOINTS = (
 """Joints of one arm, in the order of ``BoutFrames.joints``."""
 
 
-class Shape(Protocol):
-    """A primitive fixed to a body."""
+class Fixed(Protocol):
+    """What is fixed to a body and can be looked at."""
 
     @property
     def body(self) -> int:
-        """Index into the scene's body names."""
-        ...
-
-    @property
-    def kind(self) -> Kind:
-        """What it is; long ones lie along their own z."""
+        """Index of the body."""
         ...
 
     @property
     def size(self) -> Sequence[float]:
-        """Half extents x, y, z (box); radius, half length (capsule, cylinder); radius (m)."""
+        """Half extents (box, ellipsoid); radius, half length (capsule, cylinder); radius (m)."""
         ...
 
     @property
@@ -52,6 +47,15 @@ class Shape(Protocol):
     @property
     def rgba(self) -> Sequence[float]:
         """Red, green, blue, opacity, each in 0..1."""
+        ...
+
+
+class Shape(Fixed, Protocol):
+    """A primitive of the scene."""
+
+    @property
+    def kind(self) -> Kind:
+        """What it is; long ones lie along their own z."""
         ...
 
     @property
