@@ -18,6 +18,7 @@ from services.learner.config import LearnerConfig
 from services.learner.intake import Intake
 from services.learner.ppo import PolicyOptimiser, UpdateStats
 from services.learner.signing import RunFacts, seed_of, sign
+from services.learner.starvation import Starvation
 from shared.bus.base import Bus
 from shared.bus.delivery import Applied, Outbox
 from shared.clock import Clock
@@ -97,6 +98,7 @@ class Learner:
         self._announced = False
         self._waiting_since = clock.now()
         self._samples = Rate(clock, 20.0)
+        self._starvation = Starvation(clock)
         self._last_metrics: UpdateMetrics | None = None
         self._last_error = ""
         self._updates = 0
@@ -143,6 +145,7 @@ class Learner:
 
     def tick(self) -> bool:
         """Take what arrived, and update when there is enough of it."""
+        self._starvation.end()
         did = self._take_schedule()
         did |= self._take_receipt()
         self._incidents.pump()
@@ -155,6 +158,7 @@ class Learner:
         if self._announced and self._intake.samples >= self._intake.needed(self.version):
             self._update()
             did = True
+        self._starvation.begin(is_starved=self._announced and self._intake.in_turn)
         return did
 
     def _take_schedule(self) -> bool:
@@ -255,12 +259,7 @@ class Learner:
         self._report()
 
     def _metrics(
-        self,
-        stats: UpdateStats,
-        learning_rate: float,
-        lag: float,
-        waited: float,
-        seconds: float,
+        self, stats: UpdateStats, learning_rate: float, lag: float, waited: float, seconds: float
     ) -> UpdateMetrics:
         return UpdateMetrics(
             samples=stats.samples,
@@ -382,12 +381,13 @@ class Learner:
         if self._last_metrics is not None:
             rates["policy_lag"] = self._last_metrics.policy_lag_mean
             rates["update_seconds"] = self._last_metrics.update_seconds
+        counts = {"updates": self._updates, "starved_ms": self._starvation.milliseconds}
         return Health(
             state=state,
             waiting_for=waiting,
             waiting_seconds=self._clock.now() - self._waiting_since if waiting else 0.0,
             rates=rates,
-            counters={**self._intake.counters, "updates": self._updates},
+            counters=self._intake.counters | counts,
             last_error=self._last_error,
         )
 
