@@ -172,13 +172,13 @@ class LedgerReader:
                 self._connection.close()
                 raise
 
-    def replay(self) -> Iterator[Entry]:
-        """Yield every event, oldest first.
+    def replay(self, after: int = 0) -> Iterator[Entry]:
+        """Yield every event numbered above ``after``, oldest first.
 
         Raises:
             LedgerError: the file is damaged, or a newer Riposte wrote it.
         """
-        return _read(self._connection, self.path) if self._is_made else iter(())
+        return _read(self._connection, self.path, after) if self._is_made else iter(())
 
     def close(self) -> None:
         """Close the file."""
@@ -250,9 +250,10 @@ def _check(connection: sqlite3.Connection, path: Path) -> None:
         )
 
 
-def _read(connection: sqlite3.Connection, path: Path) -> Iterator[Entry]:
+def _read(connection: sqlite3.Connection, path: Path, after: int = 0) -> Iterator[Entry]:
+    query = "SELECT seq, kind, body, at_ns FROM events WHERE seq > ? ORDER BY seq"
     with _explained(path):
-        rows = connection.execute("SELECT seq, kind, body, at_ns FROM events ORDER BY seq")
+        rows = connection.execute(query, (after,))
         for seq, kind, body, at_ns in rows:
             try:
                 event = decode_event(kind, body)

@@ -1,0 +1,1 @@
+"""`riposte chaos`: named faults in a running job, and what they cost; knows every service."""
