@@ -5,12 +5,14 @@ import os
 import socket
 import threading
 from importlib import metadata
+from pathlib import Path
 from typing import Protocol
 
 from shared.bus.base import Bus
 from shared.clock import Clock
 from shared.messages.live import ServiceStatus
 from shared.messages.topics import STATUS
+from shared.runtime.beat import Beat
 from shared.runtime.process import Usage, usage
 
 IDLE_SECONDS = 0.05
@@ -59,16 +61,19 @@ def version() -> str:
         return "unknown"
 
 
-def run(service: Ticking, bus: Bus, clock: Clock, role: str, stop: threading.Event) -> None:
+def run(
+    service: Ticking, bus: Bus, clock: Clock, role: str, stop: threading.Event,
+    log: Path | None = None,
+) -> None:  # fmt: skip
     """Tick ``service`` until ``stop`` is set, and publish its status every second.
 
-    The caller closes the service and the bus.
+    The caller closes the service and the bus; ``log`` is as ``StatusReporter`` has it.
 
     Raises:
         BusError: the bus was lost for longer than its limit.
     """
     bus.declare_alive(role)
-    reporter = StatusReporter(service, bus, clock, role)
+    reporter = StatusReporter(service, bus, clock, role, log)
     while not stop.is_set():
         did = service.tick()
         reporter.tick()
@@ -76,15 +81,19 @@ def run(service: Ticking, bus: Bus, clock: Clock, role: str, stop: threading.Eve
 
 
 class StatusReporter:
-    """Publishes the ServiceStatus of one service every second."""
+    """Publishes the ServiceStatus of one service every second, and beats."""
 
-    def __init__(self, service: Ticking, bus: Bus, clock: Clock, role: str) -> None:
+    def __init__(
+        self, service: Ticking, bus: Bus, clock: Clock, role: str, log: Path | None = None
+    ) -> None:
+        """Be due at once; ``log`` is the file whose time says that the loop turns."""
         self._service = service
         self._bus = bus
         self._clock = clock
         self._role = role
         self._host = socket.gethostname()
         self._version = version()
+        self._beat = Beat(log)
         self._due_at = clock.now()
 
     def tick(self) -> None:
@@ -94,6 +103,7 @@ class StatusReporter:
             return
         self._due_at = now + STATUS_PERIOD
         self._bus.publish(STATUS, self.status(usage()), role=self._role, name=self._bus.name)
+        self._beat.tick()
 
     def status(self, used: Usage) -> ServiceStatus:
         """Return the status to publish: the service's health, the bus counters, the process."""
