@@ -1,18 +1,22 @@
 """The recording has the measured arm, the simulated ones and their residuals."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
-from services.jobs.identify.overlay import PAUSE, overlay_of
+from services.jobs.identify.overlay import PAUSE, overlay_of, write_overlay
 from shared.errors import RiposteError
+from shared.identification.dataset.types import Dataset
+from shared.identification.model_file import model_file
 from shared.identification.subject import plant_of
 from shared.sim.plant.looks import Looks
 from shared.sim.plant.plant import pr2
 from shared.telemetry.identification_recording import path_of, write_overlay_recording
 from shared.telemetry.rrd import trim
-from tests.integration.identify_job.arms import pendulum_dataset
+from tests.integration.identify_job.arms import pendulum_dataset, verdict_of
 from tests.unit.identify_job.examples import JOINTS, example
 
 PR2 = Looks(pr2("right", None))
@@ -45,6 +49,52 @@ def test_an_arm_without_anything_to_look_at_has_bones(tmp_path: Path) -> None:
     path.write_text(bare)
     looks = Looks(plant_of(dataset))
     assert "capsule" in {solid.kind for solid in looks.solids}
+
+
+WEDGE = "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 -.3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+"""A tetrahedron, as an OBJ file has it."""
+
+
+def dataset_with(dataset: Dataset, folder: Path) -> Dataset:
+    """Return the data set with its model file written again into another folder."""
+    folder.mkdir()
+    (folder / "model.xml").write_text(model_file(dataset, verdict_of(dataset)).text)
+    source = replace(dataset.source, path=folder / "model.xml")
+    return replace(dataset, source=source)
+
+
+def test_an_arm_of_meshes_is_drawn_with_them(tmp_path: Path) -> None:
+    dataset = pendulum_dataset(tmp_path)
+    (tmp_path / "looks").mkdir()
+    (tmp_path / "looks/wedge.obj").write_text(WEDGE)
+    path = tmp_path / "pendulum.xml"
+    bare = path.read_text().replace(
+        'angle="radian"/>',
+        'angle="radian" meshdir="looks"/><asset><mesh file="wedge.obj"/></asset>',
+    )
+    link = '<geom type="capsule" size=".02" fromto="0 0 0 0 0 -.3" mass="0.8"/>'
+    shape = '<geom type="mesh" mesh="wedge" mass="0.8" rgba="1 0 0 1"/>'
+    assert link in bare
+    path.write_text(bare.replace(link, shape))
+    looks = Looks(plant_of(dataset))
+    upper = next(solid for solid in looks.solids if looks.bodies[solid.body] == "upper")
+    assert upper.vertices is not None
+    assert upper.faces is not None
+    assert (upper.kind, upper.vertices.shape, upper.faces.shape) == ("mesh", (4, 3), (4, 3))
+    # MuJoCo moves a mesh to its centre of mass; placed it is where the file has it.
+    turned = np.empty(3)
+    placed: list[list[float]] = []
+    for vertex in upper.vertices.astype(np.float64):
+        mujoco.mju_rotVecQuat(turned, vertex, np.array(upper.quaternion))
+        placed.append([round(float(each), 4) for each in turned + np.array(upper.position)])
+    corners = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, -0.3]]
+    assert sorted(placed) == sorted(corners)
+    found = example("none", ("shoulder", "elbow"), has_tracker=False)
+    write_overlay(tmp_path / "recording.rrd", dataset, found.verdict, found.evidence)
+    content = (tmp_path / "recording.rrd").read_bytes()
+    assert b"/arms/measured/solid/" in content
+    assert b"Mesh3D" in content
+    assert Looks(plant_of(dataset_with(dataset, tmp_path / "elsewhere"))).solids[0].kind == "mesh"
 
 
 def test_trajectories_lie_end_to_end_held_out_first() -> None:
