@@ -4,12 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shared.identification.causes import causes_of, ties_of
 from shared.identification.certainty import half_widths
 from shared.identification.dataset.types import Float64
-from shared.identification.effect import Candidate
 from shared.identification.gate import LEAST_GAIN, LEAST_SHARE, compare, floor_of
 from shared.identification.problem import Variant
 from shared.identification.search import ALIKE, Search, Tried
+from shared.identification.sentence import sentence_of
 from shared.identification.verdict import (
     BaseValue,
     Cause,
@@ -53,17 +54,18 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
         left: what the extended model does not explain.
     """
     held_out = _held_out(found)
-    causes = _causes(found)
-    ties = _ties(found, causes)
+    widths = half_widths(found.current, found.problem.of("train"))
+    causes = causes_of(found, widths)
+    ties = ties_of(found, causes)
     word = _word(found, ties, left)
     return Conclusion(
         word=word,
-        sentence=_sentence(word, causes, ties, held_out, left),
+        sentence=sentence_of(word, causes, ties, held_out, left),
         causes=causes if word == "named" else (),
         ties=ties if word == "tie" else (),
         held_out=held_out,
         candidates=_scored(found, word),
-        base=_base(found),
+        base=_base(found, widths),
     )
 
 
@@ -130,94 +132,6 @@ def _rms(parts: list[Float64]) -> float:
     return float(np.sqrt(np.mean(np.concatenate([part.ravel() for part in parts]) ** 2)))
 
 
-def _causes(found: Search) -> tuple[Cause, ...]:
-    """Return the accepted causes with their sizes in the final fit."""
-    if not found.accepted:
-        return ()
-    final = found.current
-    widths = half_widths(final, found.problem.of("train"))
-    begin = final.space.base_size
-    base = float(found.base_losses.mean())
-    sizes: dict[Candidate, tuple[Float64, Float64]] = {}
-    for candidate, values in final.space.variant(final.z).extras:
-        count = len(values)
-        sizes[candidate] = (values, widths[begin : begin + count])
-        begin += count
-    return tuple(_cause(found, each, *sizes[each.candidate], base) for each in found.accepted)
-
-
-def _cause(found: Search, tried: Tried, values: Float64, widths: Float64, base: float) -> Cause:
-    candidate = tried.candidate
-    quantities = candidate.effect.quantities(found.problem.subject, candidate.place)
-    first = quantities[0]
-    half = float(widths[0]) * first.probe
-    value = float(values[0])
-    low, high = tried.gain.share_interval(base)
-    return Cause(
-        effect=candidate.effect.name,
-        where=candidate.place,
-        quantity=first.name,
-        value=value,
-        unit=first.unit,
-        interval=Interval(low=value - half, high=value + half),
-        title=candidate.effect.title,
-        signature=candidate.effect.signature,
-        others={
-            each.name: float(number)
-            for each, number in zip(quantities[1:], values[1:], strict=True)
-        },
-        share=tried.gain.share(base),
-        share_interval=Interval(low=low, high=high),
-    )
-
-
-def _rival(found: Search, tried: Tried, base: float) -> Cause:
-    """Return a cause that was not taken, with its sizes in its own fit."""
-    widths = half_widths(tried.fit, found.problem.of("train"))
-    values = tried.fit.space.values(tried.fit.z)[-1]
-    return _cause(found, tried, values, widths[-len(values) :], base)
-
-
-def _ties(found: Search, causes: tuple[Cause, ...]) -> tuple[Tie, ...]:
-    base = float(found.base_losses.mean())
-    out: list[Tie] = []
-    for cause, tried, rivals in zip(causes, found.accepted, found.rivals, strict=True):
-        if not rivals:
-            continue
-        others = tuple(_rival(found, each, base) for each in rivals)
-        alike = min(_cosine(tried, each) for each in rivals)
-        names = [_label(cause), *map(_label, others)]
-        out.append(Tie(causes=(cause, *others), alike=alike, record=_motion(tried, rivals, names)))
-    return tuple(out)
-
-
-def _cosine(one: Tried, other: Tried) -> float:
-    first, second = one.screened.signature, other.screened.signature
-    if first.size == 0 or second.size == 0:
-        return 0.0
-    return abs(float(first @ second))
-
-
-def _label(cause: Cause) -> str:
-    words = cause.effect.replace("_", " ")
-    return f"{words} of {cause.where}" if cause.where else words
-
-
-def _motion(tried: Tried, rivals: tuple[Tried, ...], names: list[str]) -> str:
-    """Return what to record to tell causes apart, by what sets them apart."""
-    sides = {each.candidate.effect.side for each in (tried, *rivals)}
-    places = {each.candidate.place for each in (tried, *rivals)}
-    if "tracker" in sides and len(sides) > 1:
-        how = "log joint positions beside the tracker, or fix the tracker elsewhere and repeat"
-    elif len(places) > 1 and len({each.candidate.effect.name for each in (tried, *rivals)}) == 1:
-        how = "move these joints one at a time, the others held"
-    else:
-        how = (
-            "the static grid, the crawl with reversals and fast swings of `riposte identify excite`"
-        )
-    return f"To tell {' from '.join(names)}: {how}."
-
-
 def _scored(found: Search, word: Word) -> tuple[Scored, ...]:
     """Return every candidate, those that were refitted first."""
     accepted = {each.candidate.label for each in found.accepted}
@@ -226,17 +140,22 @@ def _scored(found: Search, word: Word) -> tuple[Scored, ...]:
     for label, screened in found.screened.items():
         candidate = screened.candidate
         tried = found.tried.get(label)
-        entry = Scored(effect=candidate.effect.name, where=candidate.place, screen=screened.share)
         if tried is None:
-            why = "not among the best at first sight" if label not in accepted else ""
-            out.append(_replaced(entry, why_not=why))
+            out.append(
+                Scored(
+                    effect=candidate.effect.name,
+                    where=candidate.place,
+                    screen=screened.share,
+                    why_not="not among the best at first sight" if label not in accepted else "",
+                )
+            )
             continue
         quantity = candidate.effect.quantities(found.problem.subject, candidate.place)[0]
         out.append(
             Scored(
-                effect=entry.effect,
-                where=entry.where,
-                screen=entry.screen,
+                effect=candidate.effect.name,
+                where=candidate.place,
+                screen=screened.share,
                 gain=tried.gain.gain,
                 gain_interval=Interval(low=tried.gain.low, high=tried.gain.high),
                 value=float(tried.fit.space.values(tried.fit.z)[-1][0]),
@@ -245,10 +164,6 @@ def _scored(found: Search, word: Word) -> tuple[Scored, ...]:
             )
         )
     return tuple(sorted(out, key=lambda one: (one.gain is None, -(one.gain or 0.0), -one.screen)))
-
-
-def _replaced(entry: Scored, why_not: str) -> Scored:
-    return Scored(effect=entry.effect, where=entry.where, screen=entry.screen, why_not=why_not)
 
 
 def _why_not(
@@ -266,9 +181,8 @@ def _why_not(
     return "explained better by what was taken"
 
 
-def _base(found: Search) -> tuple[BaseValue, ...]:
+def _base(found: Search, widths: Float64) -> tuple[BaseValue, ...]:
     first, final = found.base, found.current
-    widths = half_widths(final, found.problem.of("train"))
     out: list[BaseValue] = []
     for index, each in enumerate(found.problem.parameters):
         z, half = float(final.z[index]), float(widths[index])
@@ -284,47 +198,3 @@ def _base(found: Search) -> tuple[BaseValue, ...]:
             )
         )
     return tuple(out)
-
-
-def _sentence(
-    word: Word,
-    causes: tuple[Cause, ...],
-    ties: tuple[Tie, ...],
-    held_out: HeldOut,
-    left: tuple[Unexplained, ...],
-) -> str:
-    ratio = f"{held_out.base_fit:.2f} times the noise"
-    if word == "named":
-        names = " and ".join(f"{cause.title}{_where(cause)} ({_size(cause)})" for cause in causes)
-        return (
-            f"What the simulation gets wrong: {names}. Held out, the residual goes from {ratio} "
-            f"to {held_out.extended:.2f}."
-        )
-    if word == "tie":
-        names = " or ".join(_label(cause) for cause in ties[0].causes)
-        return f"These recordings do not tell apart: {names}. {ties[0].record}"
-    if word == "none":
-        return f"Nothing to name: with its base fitted the simulation is at {ratio}."
-    if word == "base_too_coarse":
-        return (
-            f"The base model does not fit: {ratio} are left with links far from their known mass. "
-            "Release more of its parameters, or correct the model file, before looking for causes."
-        )
-    if causes:
-        names = " and ".join(f"{_label(cause)} ({_size(cause)})" for cause in causes)
-        return (
-            f"Something is wrong that no effect of the catalogue explains. Nearest comes {names}, "
-            f"but from {ratio} it leaves {held_out.extended:.2f}, which is too much to believe it."
-        )
-    place = f", most of it at {left[0].where} {left[0].phase}" if left else ""
-    return f"Something is wrong that no effect of the catalogue explains: {ratio}{place}."
-
-
-def _where(cause: Cause) -> str:
-    return f" at {cause.where}" if cause.where else ""
-
-
-def _size(cause: Cause) -> str:
-    half = (cause.interval.high - cause.interval.low) / 2
-    unit = "" if cause.unit == "1" else f" {cause.unit}"
-    return f"{cause.quantity} {cause.value:.3g} ± {half:.1g}{unit}"

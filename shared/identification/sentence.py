@@ -1,0 +1,54 @@
+"""Says in a sentence or two what a search comes to."""
+
+from shared.identification.verdict import Cause, HeldOut, Tie, Unexplained, Word
+
+
+def sentence_of(
+    word: Word,
+    causes: tuple[Cause, ...],
+    ties: tuple[Tie, ...],
+    held_out: HeldOut,
+    left: tuple[Unexplained, ...],
+) -> str:
+    """Return the verdict for people."""
+    ratio = f"{held_out.base_fit:.2f} times the noise"
+    if word == "named":
+        names = " and ".join(f"{cause.title}{_where(cause)} ({_size(cause)})" for cause in causes)
+        return (
+            f"What the simulation gets wrong: {names}. Held out, the residual goes from {ratio} "
+            f"to {held_out.extended:.2f}."
+        )
+    if word == "tie":
+        names = " or ".join(label(cause) for cause in ties[0].causes)
+        return f"These recordings do not tell apart: {names}. {ties[0].record}"
+    if word == "none":
+        return f"Nothing to name: with its base fitted the simulation is at {ratio}."
+    if word == "base_too_coarse":
+        return (
+            f"The base model does not fit: {ratio} are left with links far from their known mass. "
+            "Release more of its parameters, or correct the model file, before looking for causes."
+        )
+    if causes:
+        names = " and ".join(f"{label(cause)} ({_size(cause)})" for cause in causes)
+        return (
+            f"Something is wrong that no effect of the catalogue explains. Nearest comes {names}, "
+            f"but from {ratio} it leaves {held_out.extended:.2f}, which is too much to believe it."
+        )
+    place = f", most of it at {left[0].where} {left[0].phase}" if left else ""
+    return f"Something is wrong that no effect of the catalogue explains: {ratio}{place}."
+
+
+def label(cause: Cause) -> str:
+    """Return what and where a cause is, in plain words."""
+    words = cause.effect.replace("_", " ")
+    return f"{words} of {cause.where}" if cause.where else words
+
+
+def _where(cause: Cause) -> str:
+    return f" at {cause.where}" if cause.where else ""
+
+
+def _size(cause: Cause) -> str:
+    half = (cause.interval.high - cause.interval.low) / 2
+    unit = "" if cause.unit == "1" else f" {cause.unit}"
+    return f"{cause.quantity} {cause.value:.3g} ± {half:.1g}{unit}"
