@@ -7,6 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 PLAY_STAMP := $(VENV)/.installed-play
 TEST_FLAGS ?=
+SOAK_MINUTES ?= 120
 
 # One thread for each library in each process: spinning thread pools slow two cores down.
 export OMP_NUM_THREADS := 1
@@ -14,7 +15,7 @@ export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help train play rehearse test check format test-all slow chaos bench docs clean
+.PHONY: help train play rehearse test check format test-all slow chaos bench soak docs clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -73,6 +74,9 @@ format: $(STAMP) ## rewrite the files as `make check` wants them
 
 bench: $(STAMP) ## list the benchmarks; make bench ARGS='actor --write' measures one
 	@$(BIN)/riposte bench $(ARGS)
+
+soak: $(STAMP) ## training and play together for SOAK_MINUTES (120): does anything grow?
+	@$(BIN)/python -m benchmarks.soak --minutes $(SOAK_MINUTES) --write $(ARGS)
 
 docs: $(STAMP) ## renew the generated parts of docs/ and deploy/
 	@$(BIN)/python -m shared.messages.table --write docs/architecture.md

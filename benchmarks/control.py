@@ -55,6 +55,7 @@ class Site:
     """The processes of a match, and a seat to watch from; who watches is the person."""
 
     def __init__(self, folder: Path, settings: Sequence[str] = SETTINGS) -> None:
+        self.folder = folder
         words = [*MATCH, "--out", str(folder / "match")]
         plan = plan_of(parse([*words, *(word for item in settings for word in ("--set", item))]))
         plan.folder.mkdir(parents=True)
@@ -150,10 +151,10 @@ def _terms(plan: Plan) -> Terms:
 
 
 @contextlib.contextmanager
-def on_core(core: int) -> Iterator[None]:
-    """Let what is started in the block run on one core only."""
+def on_cores(*cores: int) -> Iterator[None]:
+    """Let what is started in the block run on these cores only."""
     before = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {core})
+    os.sched_setaffinity(0, set(cores))
     try:
         yield
     finally:
@@ -176,10 +177,10 @@ def watched(seconds: float) -> dict[str, Any]:
     """Return what was seen of the loop, of the bare round trip and of the training run."""
     cores = sorted(os.sched_getaffinity(0))
     with contextlib.ExitStack() as stack:
-        with on_core(cores[-1]):
+        with on_cores(cores[-1]):
             training = stack.enter_context(training_run(ENDLESS))
         training.wait_for_version(WARM_VERSION)
-        stack.enter_context(on_core(cores[0]))
+        stack.enter_context(on_cores(cores[0]))
         site = stack.enter_context(live_site())
         site.until_fencing()
         assert site.states is not None

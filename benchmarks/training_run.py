@@ -80,7 +80,7 @@ class TrainingRun(RunReader):
         """
         end = time.monotonic() + deadline
         while time.monotonic() < end:
-            self._check_processes()
+            self.check()
             if self.newest_checkpoint() >= number:
                 at, cpu, delay = time.monotonic(), self.cpu_seconds(), self.delay_seconds()
                 newest = self.newest_version()
@@ -89,7 +89,17 @@ class TrainingRun(RunReader):
             time.sleep(POLL_SECONDS)
         raise RiposteError(f"no version {number} within {deadline:g} s: see {self.folder / 'logs'}")
 
-    def _check_processes(self) -> None:
+    @property
+    def pids(self) -> dict[str, int]:
+        """Return the process ids by name."""
+        return self._supervisor.pids
+
+    def check(self) -> None:
+        """Look after the processes.
+
+        Raises:
+            RiposteError: one of them died.
+        """
         for event in self._supervisor.poll():
             if event.kind != "finished":
                 raise RiposteError(f"{event.describe}\n{event.tail}")
@@ -121,7 +131,7 @@ class TrainingRun(RunReader):
         """Return samples and CPU seconds of a stretch between two versions, warm."""
         begin = self.wait_for_version(WARM_VERSION)
         while time.monotonic() < begin.at + seconds:
-            self._check_processes()
+            self.check()
             time.sleep(0.5)
         end = self.wait_for_version(self.newest_checkpoint() + 1)
         assert begin.version.metrics is not None

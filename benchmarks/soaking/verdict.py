@@ -1,0 +1,220 @@
+"""What the samples of a soak say: slopes with intervals, each against its limit."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import Literal
+
+from benchmarks.slopes import Slope, slope
+from benchmarks.soaking.samples import Sample
+
+Outcome = Literal["met", "missed", "undecided"]
+HOUR = 3600.0
+MEMORY_LIMIT = 4.0
+"""MB an hour that a process may grow: about 100 MB a day."""
+COUNT_LIMIT = 1.0
+"""File handles, or threads, an hour."""
+LATENESS_LIMIT = 1.0
+"""Milliseconds an hour by which the 99th percentile of the control's lateness may grow."""
+LATE_SHARE_LIMIT = 0.01
+"""Of the control ticks: more than 10 ms late, or lost."""
+RATE_LIMIT = 0.05
+"""Share of the training rate that may go lost in an hour."""
+WARM_UP_SHARE, LEAST_WARM_UP, MOST_WARM_UP = 0.1, 30.0, 600.0
+"""Of a soak are left out of all slopes: caches fill, allocators settle (share; s; s)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Criterion:
+    """One figure, its limit, and whether it is kept."""
+
+    name: str
+    value: str
+    limit: str
+    outcome: Outcome
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdict:
+    """What came of a soak."""
+
+    criteria: tuple[Criterion, ...]
+    seconds: float
+    samples: int
+    warm_up: float
+    """Seconds left out at the beginning."""
+    rate: float
+    """Training samples a second."""
+    bouts: int
+    growth: tuple[tuple[str, Slope, float], ...]
+    """Of each process: its name, its memory's slope (MB/h), and its memory at the end (MB)."""
+    disk_mb_per_hour: dict[str, float]
+    ended: str
+    """Why it ended early; empty when it did not."""
+
+    @property
+    def outcome(self) -> Outcome:
+        """Return met only when every criterion is met."""
+        outcomes = {criterion.outcome for criterion in self.criteria}
+        return (
+            "missed" if "missed" in outcomes else "undecided" if "undecided" in outcomes else "met"
+        )
+
+
+def judged(low: float, high: float, limit: float) -> Outcome:
+    """Return whether a value known to lie in an interval is at most a limit."""
+    return "met" if high <= limit else "missed" if low > limit else "undecided"
+
+
+def hourly(found: Slope) -> Slope:
+    """Return a slope in units an hour."""
+    return dataclasses.replace(
+        found, value=found.value * HOUR, low=found.low * HOUR, high=found.high * HOUR
+    )
+
+
+def warm_up_of(seconds: float) -> float:
+    """Return how much of a soak of this length counts as warm-up (s)."""
+    return min(max(WARM_UP_SHARE * seconds, LEAST_WARM_UP), MOST_WARM_UP)
+
+
+def judge(samples: Sequence[Sample], ended: str = "") -> Verdict:
+    """Return the verdict on a soak.
+
+    Args:
+        samples: oldest first.
+        ended: why it ended early.
+
+    Raises:
+        ValueError: there are too few samples for a slope after the warm-up.
+    """
+    if not samples:
+        raise ValueError("no sample: the soak was killed before the first")
+    seconds = samples[-1].at - samples[0].at
+    warm_up = warm_up_of(seconds)
+    kept = [sample for sample in samples if sample.at >= samples[0].at + warm_up]
+    if len(kept) < 8:
+        raise ValueError(
+            f"{len(kept)} samples after a warm-up of {warm_up:.0f} s: a slope needs at least 8"
+        )
+    names = sorted(kept[-1].processes)
+    growth = tuple(
+        (name, hourly(found), kept[-1].processes[name].rss_bytes / 1e6)
+        for name in names
+        if (found := _of_process(kept, name, lambda use: use.rss_bytes / 1e6)) is not None
+    )
+    criteria = [_ended(ended), _same_processes(kept)]
+    for name, found, _ in growth:
+        criteria.append(_grows(f"memory of {name}", found, MEMORY_LIMIT, "MB/h"))
+    for what, field in (("file handles", "files"), ("threads", "threads")):
+        criteria.append(_counts(kept, names, what, field))
+    criteria += _control(kept)
+    rates = _rates(kept)
+    criteria.append(_rate(rates))
+    return Verdict(
+        criteria=tuple(criteria),
+        seconds=seconds,
+        samples=len(samples),
+        warm_up=warm_up,
+        rate=sum(rate for _, rate in rates) / max(len(rates), 1),
+        bouts=samples[-1].bouts,
+        growth=growth,
+        disk_mb_per_hour=_disk(kept),
+        ended=ended,
+    )
+
+
+def _ended(ended: str) -> Criterion:
+    said = ended.splitlines()[0] if ended else "it ran to its end"
+    return Criterion("nothing ended it early", said, "-", "missed" if ended else "met")
+
+
+def _same_processes(kept: Sequence[Sample]) -> Criterion:
+    first, last = kept[0].processes, kept[-1].processes
+    changed = [name for name in first if name not in last or last[name].pid != first[name].pid]
+    return Criterion(
+        "processes that died", ", ".join(changed) or "none", "none", "missed" if changed else "met"
+    )
+
+
+def _of_process(kept: Sequence[Sample], name: str, value: Callable[..., float]) -> Slope | None:
+    pairs = [(s.at, value(s.processes[name])) for s in kept if name in s.processes]
+    return slope([at for at, _ in pairs], [found for _, found in pairs])
+
+
+def _grows(name: str, found: Slope, limit: float, unit: str) -> Criterion:
+    return Criterion(
+        name, _text(found, unit), f"at most {limit:g} {unit}", judged(found.low, found.high, limit)
+    )
+
+
+def _counts(kept: Sequence[Sample], names: Sequence[str], what: str, field: str) -> Criterion:
+    """Return the criterion of the process that takes the most of something, growing."""
+    worst_name, worst = "", None
+    for name in names:
+        found = _of_process(kept, name, lambda use: float(getattr(use, field)))
+        if found is not None and (worst is None or found.high > worst.high):
+            worst_name, worst = name, found
+    assert worst is not None  # there are processes, and samples enough
+    return _grows(f"{what}, {worst_name} (the worst)", hourly(worst), COUNT_LIMIT, "/h")
+
+
+def _control(kept: Sequence[Sample]) -> list[Criterion]:
+    pairs = [(s.at, s.lateness_ms[1]) for s in kept if s.lateness_ms is not None]
+    found = slope([at for at, _ in pairs], [late for _, late in pairs])
+    ticks = kept[-1].ticks - kept[0].ticks
+    bad = kept[-1].ticks_late + kept[-1].ticks_lost - kept[0].ticks_late - kept[0].ticks_lost
+    if found is None or ticks <= 0:
+        return [Criterion("control ticks", "none was heard", "100 a second", "missed")]
+    share = bad / ticks
+    return [
+        _grows("lateness of the control, p99", hourly(found), LATENESS_LIMIT, "ms/h"),
+        Criterion(
+            "control ticks over 10 ms late, or lost", f"{share:.2%} of {ticks:,}",
+            f"at most {LATE_SHARE_LIMIT:.0%}", "met" if share <= LATE_SHARE_LIMIT else "missed",
+        ),
+    ]  # fmt: skip
+
+
+def _rates(kept: Sequence[Sample]) -> list[tuple[float, float]]:
+    """Return the training rate between versions: instant and samples a second.
+
+    Samples of a soak come more often than versions, or not; only stretches of a minute say much.
+    """
+    made: list[tuple[float, float]] = []
+    begin = kept[0]
+    stretch = min(60.0, (kept[-1].at - kept[0].at) / 8)
+    for sample in kept[1:]:
+        if sample.at - begin.at >= stretch:
+            samples = (sample.version - begin.version) * sample.batch_samples
+            middle = (sample.at + begin.at) / 2
+            made.append((middle, samples / (sample.at - begin.at)))
+            begin = sample
+    return made
+
+
+def _rate(rates: Sequence[tuple[float, float]]) -> Criterion:
+    found = slope([at for at, _ in rates], [rate for _, rate in rates])
+    if found is None or found.mean <= 0.0:
+        return Criterion("training rate", "nothing was learned", "more than 0", "missed")
+    loss = dataclasses.replace(
+        hourly(found), value=-found.value * HOUR / found.mean, low=-found.high * HOUR / found.mean,
+        high=-found.low * HOUR / found.mean,
+    )  # fmt: skip
+    return Criterion(
+        "loss of training rate", _text(loss, "an hour", percent=True),
+        f"at most {RATE_LIMIT:.0%} an hour", judged(loss.low, loss.high, RATE_LIMIT),
+    )  # fmt: skip
+
+
+def _disk(kept: Sequence[Sample]) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for job in kept[-1].disk_bytes:
+        line = slope([s.at for s in kept], [s.disk_bytes[job] / 1e6 for s in kept])
+        if line is not None:
+            found[job] = line.value * HOUR
+    return found
+
+
+def _text(found: Slope, unit: str, *, percent: bool = False) -> str:
+    form = "+.1%" if percent else "+.2f"
+    return f"{found.value:{form}} [{found.low:{form}}, {found.high:{form}}] {unit}"

@@ -1,0 +1,158 @@
+"""Slopes and verdicts of a soak, on series whose growth is known."""
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from benchmarks.slopes import slope
+from benchmarks.soaking import page
+from benchmarks.soaking.samples import Ended, ProcessUse, Sample, read
+from benchmarks.soaking.verdict import judge, warm_up_of
+from shared.errors import ConfigError
+
+HOUR = 3600.0
+
+
+def test_a_straight_line_has_its_slope_and_no_width():
+    found = slope([float(i) for i in range(100)], [3.0 + 0.5 * i for i in range(100)])
+    assert found is not None
+    assert (found.value, found.low, found.high) == pytest.approx((0.5, 0.5, 0.5))
+
+
+def test_the_interval_is_students_over_the_blocks():
+    found = slope([0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 1.0, 3.0], blocks=4)
+    # By hand: slope 0.9, residuals 0.1, 0.2, -0.7, 0.4, two degrees of freedom: t = 4.303.
+    assert found is not None
+    assert found.value == pytest.approx(0.9)
+    assert found.high - found.value == pytest.approx(4.303 * (0.7 / 2 / 5) ** 0.5)
+
+
+def test_nineteen_of_twenty_intervals_hold_the_planted_slope():
+    generator = np.random.default_rng(1)
+    times = np.arange(400.0)
+    held = 0
+    for _ in range(200):
+        found = slope(list(times), list(0.01 * times + generator.standard_normal(400)))
+        assert found is not None
+        held += found.low <= 0.01 <= found.high
+    assert 180 <= held <= 199
+
+
+def test_too_short_a_series_has_no_slope():
+    assert slope([0.0, 1.0, 2.0], [1.0, 1.0, 1.0]) is None
+    assert slope([0.0] * 9, [1.0] * 9) is None
+
+
+def sample(at: float, *, rss: float = 100e6, files: int = 30, late: float = 1.0, **more) -> Sample:
+    fields = {
+        "at": at, "version": int(at), "batch_samples": 20480, "lateness_ms": (0.1, late, 20.0),
+        "ticks": int(100 * at), "ticks_late": 0, "ticks_lost": 0, "bouts": int(at / 20),
+        "disk_bytes": {"train": int(1e4 * at), "play": 0},
+        "processes": {
+            "train/league-0": ProcessUse(
+                pid=7, rss_bytes=int(rss), files=files, threads=4, cpu_seconds=at
+            )
+        },
+    }  # fmt: skip
+    return Sample(**(fields | more))
+
+
+def outcomes(samples: list[Sample], ended: str = "") -> dict[str, str]:
+    verdict = judge(samples, ended)
+    return {criterion.name: criterion.outcome for criterion in verdict.criteria}
+
+
+def test_a_soak_in_which_nothing_grows_is_met():
+    verdict = judge([sample(at) for at in range(0, 7200, 5)])
+    assert verdict.outcome == "met", verdict.criteria
+    assert verdict.rate == pytest.approx(20480)
+    assert verdict.disk_mb_per_hour["train"] == pytest.approx(36.0)
+    assert verdict.warm_up == 600.0
+
+
+def test_what_fills_up_at_the_beginning_is_no_growth():
+    filling = [sample(at, rss=100e6 + 5e5 * min(at, 500)) for at in range(0, 7200, 5)]
+    assert judge(filling).outcome == "met"
+
+
+@pytest.mark.parametrize(
+    ("changed", "missed"),
+    [
+        (lambda at: {"rss": 100e6 + at / HOUR * 8e6}, "memory of train/league-0"),
+        (lambda at: {"files": 30 + int(at / 600)}, "file handles, train/league-0 (the worst)"),
+        (lambda at: {"late": 1.0 + 3.0 * at / HOUR}, "lateness of the control, p99"),
+        (lambda at: {"ticks_late": int(3 * at)}, "control ticks over 10 ms late, or lost"),
+        (lambda at: {"version": int(at - 0.05 * at * at / HOUR)}, "loss of training rate"),
+        (
+            lambda at: {"processes": {"train/league-0": ProcessUse(
+                pid=7 if at < 3000 else 8, rss_bytes=10**8, files=30, threads=4, cpu_seconds=at
+            )}},
+            "processes that died",
+        ),
+    ],
+)  # fmt: skip
+def test_growth_beyond_its_limit_is_missed_and_nothing_else_is(changed, missed: str):
+    found = outcomes([sample(at, **changed(at)) for at in range(0, 7200, 5)])
+    assert found[missed] == "missed"
+    assert [name for name, outcome in found.items() if outcome != "met"] == [missed]
+
+
+def test_a_noisy_short_soak_is_undecided():
+    generator = np.random.default_rng(0)
+    noisy = [sample(at, rss=100e6 + 3e6 * generator.standard_normal()) for at in range(0, 300, 5)]
+    assert outcomes(noisy)["memory of train/league-0"] == "undecided"
+    assert judge(noisy).outcome == "undecided"
+
+
+def test_a_soak_that_a_death_ended_is_missed():
+    samples = [sample(at) for at in range(0, 600, 5)]
+    assert outcomes(samples, "actor-0 died")["nothing ended it early"] == "missed"
+
+
+def test_a_killed_soak_is_read_up_to_its_last_whole_line(tmp_path: Path):
+    path = tmp_path / "soak.jsonl"
+    lines = [msgspec.json.encode(sample(at)) + b"\n" for at in range(0, 300, 5)]
+    path.write_bytes(b"".join(lines) + lines[0][:40])
+    samples, ended = read(path)
+    assert (len(samples), ended) == (60, "")
+    assert judge(samples).samples == 60
+    path.write_bytes(b"".join(lines) + msgspec.json.encode(Ended(ended="gone")) + b"\n")
+    assert read(path)[1] == "gone"
+    path.write_bytes(b"{}\n")
+    with pytest.raises(ConfigError, match="line 1"):
+        read(path)
+    with pytest.raises(ConfigError, match="cannot read"):
+        read(tmp_path / "none")
+
+
+def test_too_few_samples_are_refused():
+    with pytest.raises(ValueError, match="at least 8"):
+        judge([sample(at) for at in range(0, 40, 5)])
+    with pytest.raises(ValueError, match="no sample"):
+        judge([])
+    assert (warm_up_of(60), warm_up_of(1800), warm_up_of(36_000)) == (30.0, 180.0, 600.0)
+
+
+def test_the_block_is_put_into_the_page_and_replaced_there(tmp_path: Path):
+    verdict = judge([sample(at) for at in range(0, 7200, 5)])
+    machine = {
+        "quiet": True,
+        "cores": 2,
+        "name": "CPU",
+        "load_before": (0, 0),
+        "load_after": (1, 1),
+    }
+    path = tmp_path / "reliability.md"
+    page.write(path, page.block_of(verdict, machine, "abc", "make soak"))
+    assert path.read_text().startswith("# Reliability\n\n## Soak\n\n<!-- soak:begin -->\n**met**")
+    path.write_text("# R\n\nfaults\n\n## Soak\n\n" + path.read_text().partition("## Soak\n\n")[2])
+    page.write(path, "again")
+    expected = "# R\n\nfaults\n\n## Soak\n\n<!-- soak:begin -->\nagain\n<!-- soak:end -->\n"
+    assert path.read_text() == expected
+    path.write_text("# R\n\n## Soak\n\nlater\n")
+    page.write(path, "now")
+    assert path.read_text().count("## Soak") == 1
+    assert path.read_text().endswith("<!-- soak:end -->\nlater\n")
+    assert "✓ memory of train/league-0" in page.text_of(verdict)
