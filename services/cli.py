@@ -32,6 +32,7 @@ JOBS = (
     Command("identify", "jobs.identify.command", "what the simulation gets wrong, and why"),
     Command("export", "jobs.export", "a trained policy as ONNX, for other runtimes"),
     Command("sim", "jobs.sim", "export the two-robot model as MJCF"),
+    Command("certs", "jobs.certs.command", "certificates, for a bus across machines"),
     Command("up", "jobs.up", "start and keep alive the processes a site file lists"),
 )
 SERVICES = (
@@ -64,6 +65,7 @@ EXTRAS = {
     "apsw": "robot",
     "openvr": "robot",
     "bleak": "robot",
+    "cryptography": "certs",
 }
 """Import name of an optional library: the extra that installs it."""
 

@@ -16,7 +16,8 @@ from shared.clock import Clock, SystemClock
 from shared.errors import ConfigError
 from shared.messages.live import Progress, ServiceStatus
 from shared.messages.topics import PROGRESS, STATUS
-from shared.runtime.serve import ServeArgs, open_site_bus, run_id_of
+from shared.runtime.files import atomic_write
+from shared.runtime.serve import ServeArgs, certificates_override, open_site_bus, run_id_of
 
 LISTEN_SECONDS = 1.5
 """Every process reports once a second."""
@@ -33,6 +34,8 @@ class Endpoint(msgspec.Struct, frozen=True, kw_only=True):
     connect: str
     run: str
     """Name of the run on the bus."""
+    certificates: str = ""
+    """Folder of the site's certificates; empty where it has none."""
 
 
 class Snapshot(msgspec.Struct, frozen=True, kw_only=True):
@@ -60,21 +63,28 @@ def read_endpoint(folder: Path) -> Endpoint:
         raise ConfigError(f"{path} is damaged: {error}") from error
 
 
+def write_endpoint(folder: Path, endpoint: Endpoint) -> None:
+    """Say in ``folder`` where its run can be reached."""
+    atomic_write(folder / "endpoint.json", msgspec.json.encode(endpoint))
+
+
 def bus_args(found: argparse.Namespace, role: str) -> ServeArgs:
     """Return the bus identity of an onlooker.
 
     Args:
-        found: parsed ``site``, ``run``, ``run_id`` and ``connect``; without a site or an endpoint
-            the run's own ``endpoint.json`` says where to look.
+        found: parsed ``site``, ``run``, ``run_id``, ``connect`` and ``certificates``; without a
+            site or an endpoint the run's own ``endpoint.json`` says where to look.
         role: also the start of the onlooker's name.
 
     Raises:
         ConfigError: nothing says where the bus is.
     """
     connect, run_id = tuple(found.connect), str(found.run_id)
+    certificates = found.certificates
     if not connect and found.site is None:
         endpoint = read_endpoint(found.run)
         connect, run_id = (endpoint.connect,), run_id or endpoint.run
+        certificates = certificates or endpoint.certificates
     return ServeArgs(
         role=role,
         site=found.site,
@@ -82,7 +92,10 @@ def bus_args(found: argparse.Namespace, role: str) -> ServeArgs:
         run=found.run,
         run_id=run_id or run_id_of(found.run),
         connect=connect,
-        overrides=(f"bus.open_seconds={OPEN_SECONDS}",),
+        overrides=(
+            f"bus.open_seconds={OPEN_SECONDS}",
+            *certificates_override(certificates),
+        ),
     )
 
 
@@ -224,4 +237,8 @@ def add_bus_arguments(
     parser.add_argument(
         "--connect", action="append", default=[], metavar="ENDPOINT",
         help="bus endpoint, as in tcp/127.0.0.1:7447; may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--certificates", default="", metavar="DIR",
+        help="folder of riposte certs (that of the site file)",
     )  # fmt: skip

@@ -1,13 +1,17 @@
 """The ``[bus]`` section of a site file, and what it means to Zenoh."""
 
+import ipaddress
 import json
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import msgspec
+import structlog
 
+from shared.bus.tls import files_of, tls_json
 from shared.errors import ConfigError
-from shared.messages.topics import MIB, SERVICES, TOPICS
+from shared.messages.topics import MIB, SERVICES, TOPICS, Role
 
 MAX_MESSAGE = max(
     *(topic.max_bytes for topic in TOPICS),
@@ -19,7 +23,13 @@ SHARED_MEMORY_POOL = 6 * MIB
 """What one process passes to others at a time (bytes); what does not fit goes through the socket.
 Whoever gets something maps the whole pool of its sender, so it counts once in each process."""
 
-_ENDPOINT = re.compile(r"(tcp|tls|quic|ws)/(\[[0-9a-fA-F:.]+\]|[^:/\[\]]+):[0-9]{1,5}")
+_ENDPOINT = re.compile(
+    r"(?P<protocol>tcp|tls|quic)/(?P<host>\[[0-9a-fA-F:.]+\]|[^:/\[\]?#]+):[0-9]{1,5}"
+)
+_ENCRYPTED = ("tls", "quic")
+
+
+log = structlog.get_logger()
 
 
 class BusConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -29,6 +39,11 @@ class BusConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Endpoints of routers, tried in order; empty: those of ``listen``."""
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)
     """Where this site's router listens; only itself by default."""
+    certificates: str = ""
+    """Folder of ``riposte certs``: encrypted, and everyone known by role. Empty: this machine
+    only."""
+    plain_network: bool = False
+    """Let anyone on the network read and command everything, where certificates is empty."""
     open_seconds: float = 10.0
     """How long a process waits for a router when it starts."""
     watchdog_seconds: float = 5.0
@@ -58,6 +73,7 @@ class BusConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
                     )
         if not self.connect and not self.listen:
             raise ValueError("connect and listen are both empty: give an endpoint to one of them")
+        self._check_network()
         for name in (
             "open_seconds", "watchdog_seconds", "give_up_seconds", "lease_seconds",
             "block_seconds", "resend_seconds",
@@ -95,10 +111,50 @@ class BusConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         """Return the endpoints a client connects to."""
         return self.connect or self.listen
 
+    @property
+    def exposed(self) -> tuple[str, ...]:
+        """Return the endpoints that other machines can reach, or that are on them."""
+        return tuple(one for one in (*self.connect, *self.listen) if not _is_loopback(one))
 
-def client_json(cfg: BusConfig) -> str:
-    """Return Zenoh's configuration of a client: no scouting, no open socket."""
-    return json.dumps({
+    @property
+    def local_protocol(self) -> str:
+        """Return how the processes of one machine reach their router."""
+        return "tls" if self.certificates else "tcp"
+
+    def _check_network(self) -> None:
+        if self.certificates and self.plain_network:
+            raise ValueError(
+                "plain_network is for a bus without certificates: leave one of them out"
+            )
+        if self.plain_network:
+            return
+        for name in ("connect", "listen"):
+            for endpoint in getattr(self, name):
+                if _is_loopback(endpoint):
+                    continue
+                if not self.certificates:
+                    raise ValueError(
+                        f"{name} has {endpoint}, which is off this machine, and there are no "
+                        "certificates: make them with `riposte certs DIR --host NAME_OR_ADDRESS`, "
+                        'and say where they are with certificates = "DIR" in [bus] or '
+                        "--certificates DIR"
+                    )
+                _check_encrypted(name, endpoint)
+
+
+def warn_of_plain_network(cfg: BusConfig) -> None:
+    """Log once that everybody on the network may read and command everything."""
+    if cfg.plain_network and cfg.exposed:
+        log.warning("network_unprotected", endpoints=", ".join(cfg.exposed))
+
+
+def client_json(cfg: BusConfig, role: Role) -> str:
+    """Return Zenoh's configuration of a client: no scouting, no open socket.
+
+    Raises:
+        ConfigError: an endpoint is not encrypted, or the role's certificate is not there.
+    """
+    config: dict[str, Any] = {
         "mode": "client",
         "connect": {
             "endpoints": list(cfg.routers),
@@ -110,11 +166,21 @@ def client_json(cfg: BusConfig) -> str:
         },
         "listen": {"endpoints": []},
         **_common(cfg),
-    })  # fmt: skip
+    }  # fmt: skip
+    _secure(config, cfg, role, "connect", cfg.routers)
+    return json.dumps(config)
 
 
 def router_json(cfg: BusConfig) -> str:
-    """Return Zenoh's configuration of a router."""
+    """Return Zenoh's configuration of a router, for ours and for zenohd.
+
+    Raises:
+        ConfigError: it has no endpoint, one is not encrypted, or its certificate is not there.
+    """
+    if not cfg.listen:
+        raise ConfigError(
+            "[bus] listen is empty: a router needs an endpoint, as tcp/127.0.0.1:7447"
+        )
     config: dict[str, Any] = {
         "mode": "router",
         "connect": {"endpoints": list(cfg.connect)},
@@ -124,7 +190,40 @@ def router_json(cfg: BusConfig) -> str:
     config["transport"]["unicast"] = {
         "max_sessions": 5000, "accept_pending": 1000, "accept_timeout": 2000,
     }  # fmt: skip
+    _secure(config, cfg, "router", "listen", (*cfg.listen, *cfg.connect))
     return json.dumps(config)
+
+
+def _secure(
+    config: dict[str, Any], cfg: BusConfig, role: str, name: str, endpoints: Sequence[str]
+) -> None:
+    """Say which protocols are spoken, and with which certificates."""
+    link = config["transport"]["link"]
+    link["protocols"] = sorted({endpoint.partition("/")[0] for endpoint in endpoints})
+    if not cfg.certificates:
+        return
+    for endpoint in endpoints:
+        try:
+            _check_encrypted(name, endpoint)
+        except ValueError as error:
+            raise ConfigError(f"[bus] {error}") from error
+    link["tls"] = tls_json(files_of(cfg.certificates, role))
+
+
+def _check_encrypted(name: str, endpoint: str) -> None:
+    protocol, _, rest = endpoint.partition("/")
+    if protocol not in _ENCRYPTED:
+        raise ValueError(f"{name} has {endpoint}, and there are certificates: say tls/{rest}")
+
+
+def _is_loopback(endpoint: str) -> bool:
+    """Return whether an endpoint is only for this machine."""
+    found = _ENDPOINT.fullmatch(endpoint)
+    host = found["host"].strip("[]") if found else ""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 def _common(cfg: BusConfig) -> dict[str, Any]:

@@ -28,16 +28,17 @@ from zenoh.handlers import Callback
 
 from shared.bus.arrivals import take_answer, take_request, take_value
 from shared.bus.base import NoAnswer, Refused
-from shared.bus.config import BusConfig, client_json, router_json
+from shared.bus.config import BusConfig, client_json, router_json, warn_of_plain_network
 from shared.bus.counters import Counters
 from shared.bus.endpoints import Answer, Host, Present, Requests, Values, ask_of, too_long
 from shared.bus.keys import check_chunk, key_of, pattern_of
 from shared.bus.latest import LatestSent, stamp_of
+from shared.bus.tls import files_of, why_refused
 from shared.bus.watchdog import Watchdog
 from shared.clock import Clock
 from shared.errors import BusError, ConfigError, MessageError
 from shared.messages.message import Message
-from shared.messages.topics import Qos, Service, Topic
+from shared.messages.topics import Qos, Role, Service, Topic
 from shared.messages.wire import encode
 
 In = TypeVar("In", bound=Message)
@@ -54,7 +55,9 @@ CLOSE_SECONDS = 3.0
 log = structlog.get_logger()
 
 
-def open_zenoh(cfg: BusConfig, name: str, clock: Clock, run: str) -> "ZenohBus":
+def open_zenoh(
+    cfg: BusConfig, name: str, clock: Clock, run: str, role: Role = "operator"
+) -> "ZenohBus":
     """Return a session on the bus, once a router has answered.
 
     Args:
@@ -64,25 +67,26 @@ def open_zenoh(cfg: BusConfig, name: str, clock: Clock, run: str) -> "ZenohBus":
         run: name of the run; processes of other runs are not seen.
 
     Raises:
+        role: whose certificate the process shows, where ``cfg`` has certificates.
         BusError: no router answered within ``cfg.open_seconds``.
         ValueError: ``name`` or ``run`` cannot be part of a key.
     """
+        ConfigError: the certificates are not there, or an endpoint does not go with them.
     check_chunk("name", name)
     check_chunk("run", run)
     zenoh.init_log_from_env_or("error")
     endpoints = ", ".join(cfg.routers)
     began_at = clock.now()
+    config = client_json(cfg, role)
+    warn_of_plain_network(cfg)
     told = False
     while True:
         try:
-            return ZenohBus(cfg, name, clock, run, _open(client_json(cfg)))
+            return ZenohBus(cfg, name, clock, run, _open(config), config)
         except zenoh.ZError as error:
             waited = clock.now() - began_at
             if waited > cfg.open_seconds:
-                raise BusError(
-                    f"no router at {endpoints} within {cfg.open_seconds:g} s: start one with "
-                    "`riposte router`, or name another endpoint with --connect"
-                ) from error
+                raise BusError(_no_session(cfg, role)) from error
             if waited > 1.0 and not told:
                 told = True
                 log.info("router_awaited", endpoints=endpoints, deadline=cfg.open_seconds)
@@ -91,6 +95,20 @@ def open_zenoh(cfg: BusConfig, name: str, clock: Clock, run: str) -> "ZenohBus":
 
 class Router:
     """A Zenoh router in this process."""
+def _no_session(cfg: BusConfig, role: Role) -> str:
+    """Return what a person should look at when no session opens."""
+    where = f"no session at {', '.join(cfg.routers)} within {cfg.open_seconds:g} s"
+    tls = [one for one in cfg.routers if one.startswith("tls/")]
+    if cfg.certificates and tls:
+        reasons = [(one, why_refused(one, files_of(cfg.certificates, role))) for one in tls]
+        if said := "; ".join(f"{one}: {reason}" for one, reason in reasons if reason):
+            return f"{where}: {said}"
+    return (
+        f"{where}: no router answers there; start one with `riposte router`, or name another "
+        "endpoint with --connect"
+    )
+
+
 
     def __init__(self, session: zenoh.Session, endpoints: tuple[str, ...]) -> None:
         self.endpoints = endpoints
@@ -110,15 +128,13 @@ def open_router(cfg: BusConfig) -> Router:
     """Return a running router on ``cfg.listen``.
 
     Raises:
-        ConfigError: it cannot listen there.
+        ConfigError: it cannot listen there, or its certificate is not there.
     """
-    if not cfg.listen:
-        raise ConfigError(
-            "[bus] listen is empty: a router needs an endpoint, as tcp/127.0.0.1:7447"
-        )
+    config = router_json(cfg)
+    warn_of_plain_network(cfg)
     zenoh.init_log_from_env_or("off")  # it would repeat our one line in twenty of its own
     try:
-        return Router(_open(router_json(cfg)), cfg.listen)
+        return Router(_open(config), cfg.listen)
     except zenoh.ZError as error:
         text = str(error)
         where = ", ".join(cfg.listen)
@@ -134,7 +150,13 @@ class ZenohBus:
     """One process's session; made by ``open_zenoh``."""
 
     def __init__(
-        self, cfg: BusConfig, name: str, clock: Clock, run: str, session: zenoh.Session
+        self,
+        cfg: BusConfig,
+        name: str,
+        clock: Clock,
+        run: str,
+        session: zenoh.Session,
+        config: str,
     ) -> None:
         self.name = name
         self.boot = secrets.token_hex(8)
@@ -147,10 +169,11 @@ class ZenohBus:
             clock, self._counts, self._news.set, cfg.inbox_messages, cfg.inbox_mib << 20
         )
         self._watchdog = Watchdog(
-            cfg, clock, session, _has_router, lambda: _try_open(client_json(cfg)), _close
+            cfg, clock, session, _has_router, lambda: _try_open(config), _close
         )
         self._declared: dict[object, tuple[Declare, Any]] = {}
         self._present: dict[str, Present] = {}
+        """Take over a session; ``config`` is what it was opened with, to open the next."""
         self._latest = LatestSent(cfg.resend_seconds - UPKEEP_SECONDS / 2)
         self._published = 0
         self._upkeep_at = 0.0

@@ -31,7 +31,7 @@ def table() -> str:
 def _topic_row(topic: Topic[Any]) -> str:
     return _row(
         topic.key, topic.message.__name__, topic.qos.value, _size(topic.max_bytes),
-        topic.writer, topic.readers, topic.about,
+        ", ".join(topic.writers), ", ".join(topic.readers), topic.about,
     )  # fmt: skip
 
 
@@ -41,7 +41,7 @@ def _service_row(service: Service[Any, Any]) -> str:
         f"{service.request.__name__} → {service.reply.__name__}",
         "request, acknowledged" if service.acked else "request",
         f"{_size(service.max_bytes)} → {_size(service.max_reply_bytes)}",
-        service.asker, service.answerer, service.about,
+        ", ".join(service.askers), service.answerer, service.about,
     )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 import dataclasses
 import enum
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Literal, TypeVar, get_args
 
 from shared.messages.league import (
     BoutResults,
@@ -44,6 +44,16 @@ from shared.messages.training import (
 
 M = TypeVar("M", bound=Message)
 R = TypeVar("R", bound=Message)
+Role = Literal[
+    "league", "learner", "actor", "recorder", "referee", "policy", "robot_io", "page", "metrics",
+    "operator",
+]  # fmt: skip
+"""Who speaks on the bus; ``operator`` is what a person's commands are."""
+ROLES: tuple[Role, ...] = get_args(Role)
+SERVICE_ROLES: tuple[Role, ...] = tuple(role for role in ROLES if role != "operator")
+CERTIFIED: tuple[str, ...] = ("router", *ROLES)
+"""Common names of a site's certificates; the router carries what others say."""
+
 
 
 class Qos(enum.Enum):
@@ -59,7 +69,7 @@ class Qos(enum.Enum):
 
 @dataclasses.dataclass(frozen=True)
 class Topic(Generic[M]):
-    """A published value: one writer, any number of readers."""
+    """A published value."""
 
     key: str
     """Key expression with ``{fields}``."""
@@ -67,8 +77,9 @@ class Topic(Generic[M]):
     qos: Qos
     max_bytes: int
     """Payloads over this are refused unread."""
-    writer: str
-    readers: str
+    writers: tuple[Role, ...]
+    """Where the key has a ``{role}`` it is the writer's own."""
+    readers: tuple[Role, ...]
     about: str
 
 
@@ -81,8 +92,8 @@ class Service(Generic[M, R]):
     reply: type[R]
     max_bytes: int
     max_reply_bytes: int
-    asker: str
-    answerer: str
+    askers: tuple[Role, ...]
+    answerer: Role
     about: str
     acked: bool = False
     qos: Qos = Qos.REQUEST
@@ -93,98 +104,98 @@ MIB = 1024 * KIB
 
 # fmt: off
 ROLLOUT = Service(
-    "learner/{agent}/rollout", Rollout, Receipt, 8 * MIB, 4 * KIB, "actor", "learner",
+    "learner/{agent}/rollout", Rollout, Receipt, 8 * MIB, 4 * KIB, ("actor",), "learner",
     "T x N steps; acknowledged when a checkpoint holds the update made from them", acked=True,
 )
 RESULTS = Service(
-    "league/results", BoutResults, Receipt, 1 * MIB, 4 * KIB, "actor", "league",
+    "league/results", BoutResults, Receipt, 1 * MIB, 4 * KIB, ("actor",), "league",
     "finished bouts; acknowledged when they are in the ledger", acked=True,
 )
 VERSION = Service(
-    "league/version", VersionReport, VersionReceipt, 8 * MIB, 4 * KIB, "learner", "league",
+    "league/version", VersionReport, VersionReceipt, 8 * MIB, 4 * KIB, ("learner",), "league",
     "a new policy version; acknowledged when ledger and snapshot store hold it", acked=True,
 )
 INCIDENT = Service(
-    "league/incident", Incident, Receipt, 16 * KIB, 4 * KIB, "any", "league",
+    "league/incident", Incident, Receipt, 16 * KIB, 4 * KIB, ("learner", "operator"), "league",
     "what the report should mention", acked=True,
 )
 LEASE = Service(
-    "league/lease", LeaseRequest, Lease, 4 * KIB, 16 * KIB, "actor", "league", "asks for work"
+    "league/lease", LeaseRequest, Lease, 4 * KIB, 16 * KIB, ("actor",), "league", "asks for work"
 )
 RENEWAL = Service(
-    "league/renewal", LeaseRenewal, LeaseStatus, 4 * KIB, 4 * KIB, "actor", "league",
+    "league/renewal", LeaseRenewal, LeaseStatus, 4 * KIB, 4 * KIB, ("actor",), "league",
     "keeps a lease alive",
 )
 SNAPSHOT = Service(
-    "league/snapshot", SnapshotRequest, SnapshotReply, 4 * KIB, 8 * MIB, "actor", "league",
+    "league/snapshot", SnapshotRequest, SnapshotReply, 4 * KIB, 8 * MIB, ("actor",), "league",
     "fetches an immutable policy by its hash",
 )
 POLICY = Topic(
-    "learner/{agent}/policy", PolicyAnnouncement, Qos.LATEST, 8 * MIB, "learner", "actor",
+    "learner/{agent}/policy", PolicyAnnouncement, Qos.LATEST, 8 * MIB, ("learner",), ("actor",),
     "the version to act with",
 )
 SCHEDULE = Topic(
-    "league/schedule", Schedule, Qos.LATEST, 1 * MIB, "league", "learner, recorder",
-    "stage, leases and versions",
+    "league/schedule", Schedule, Qos.LATEST, 1 * MIB, ("league",),
+    ("actor", "learner", "recorder", "operator"), "stage, leases and versions",
 )
 PROGRESS = Topic(
-    "league/progress", Progress, Qos.LATEST, 64 * KIB, "league", "train, status, recorder",
-    "where the run stands",
+    "league/progress", Progress, Qos.LATEST, 64 * KIB, ("league",),
+    ("recorder", "metrics", "operator"), "where the run stands",
 )
 STATUS = Topic(
-    "status/{role}/{name}", ServiceStatus, Qos.LATEST, 64 * KIB, "every service",
-    "status, train, recorder", "health, rates, and whom a service waits for",
+    "status/{role}/{name}", ServiceStatus, Qos.LATEST, 64 * KIB, SERVICE_ROLES,
+    ("recorder", "page", "metrics", "operator"), "health, rates, and whom a service waits for",
 )
 FRAMES = Topic(
-    "actor/{name}/frames", BoutFrames, Qos.STREAM, 8 * MIB, "actor", "recorder",
+    "actor/{name}/frames", BoutFrames, Qos.STREAM, 8 * MIB, ("actor",), ("recorder",),
     "a sampled bout to look at",
 )
 BATS = Topic(
-    "play/bats", BatStates, Qos.STREAM, 4 * KIB, "robot_io", "policy, referee, page, recorder",
-    "both bats, 100 a second",
+    "play/bats", BatStates, Qos.STREAM, 4 * KIB, ("robot_io",),
+    ("policy", "referee", "page", "recorder", "operator"), "both bats, 100 a second",
 )
 ARMS = Topic(
-    "play/arms", ArmStates, Qos.STREAM, 4 * KIB, "robot_io", "page, recorder",
+    "play/arms", ArmStates, Qos.STREAM, 4 * KIB, ("robot_io",), ("page", "recorder"),
     "joints of the robots that play",
 )
 ROBOT = Topic(
-    "play/robot", RobotReport, Qos.STREAM, 4 * KIB, "robot_io", "recorder",
+    "play/robot", RobotReport, Qos.STREAM, 4 * KIB, ("robot_io",), ("recorder",),
     "forces, efforts and troubles of the robot",
 )
 TRACKER = Topic(
-    "play/tracker", TrackerPose, Qos.STREAM, 4 * KIB, "page", "robot_io, recorder",
+    "play/tracker", TrackerPose, Qos.STREAM, 4 * KIB, ("page",), ("robot_io", "recorder"),
     "a person's bat, from a page",
 )
 TRACKER_RAW = Topic(
-    "play/tracker_raw", TrackerRaw, Qos.STREAM, 4 * KIB, "robot_io", "calibrate, recorder",
+    "play/tracker_raw", TrackerRaw, Qos.STREAM, 4 * KIB, ("robot_io",), ("recorder", "operator"),
     "a Vive tracker in the base stations' frame",
 )
 OFFSET = Topic(
-    "play/{agent}/offset", DesiredOffset, Qos.STREAM, 4 * KIB, "policy", "robot_io, recorder",
-    "where the tool should go from here",
+    "play/{agent}/offset", DesiredOffset, Qos.STREAM, 4 * KIB, ("policy",),
+    ("robot_io", "recorder"), "where the tool should go from here",
 )
 REFEREE = Topic(
-    "play/referee", RefereeState, Qos.LATEST, 4 * KIB, "referee", "robot_io, recorder, page, play",
-    "phase, score and tone of the bout",
+    "play/referee", RefereeState, Qos.LATEST, 4 * KIB, ("referee",),
+    ("robot_io", "policy", "page", "recorder", "operator"), "phase, score and tone of the bout",
 )
 GATE = Topic(
-    "play/gate", GateState, Qos.LATEST, 4 * KIB, "robot_io", "page, play, recorder, status",
+    "play/gate", GateState, Qos.LATEST, 4 * KIB, ("robot_io",), ("page", "recorder", "operator"),
     "mode of the safety gate and what it sent",
 )
 HEART_RATE = Topic(
-    "play/heart_rate", HeartRate, Qos.STREAM, 4 * KIB, "robot_io", "recorder, page",
+    "play/heart_rate", HeartRate, Qos.STREAM, 4 * KIB, ("robot_io",), ("recorder", "page"),
     "of the person who plays",
 )
 BOUT = Service(
-    "play/bout", PlayRequest, PlayReply, 4 * KIB, 4 * KIB, "page, play", "referee",
+    "play/bout", PlayRequest, PlayReply, 4 * KIB, 4 * KIB, ("page", "operator"), "referee",
     "starts, pauses and ends a bout",
 )
 PLAYER = Service(
-    "play/{agent}/player", PlayerRequest, PlayerReply, 4 * KIB, 4 * KIB, "page", "policy",
+    "play/{agent}/player", PlayerRequest, PlayerReply, 4 * KIB, 4 * KIB, ("page",), "policy",
     "who plays a side from the next bout on",
 )
 ARM = Service(
-    "play/arm", GateRequest, GateReply, 4 * KIB, 16 * KIB, "page, play, robot", "robot_io",
+    "play/arm", GateRequest, GateReply, 4 * KIB, 16 * KIB, ("page", "operator"), "robot_io",
     "a person arms or disarms the robot",
 )
 

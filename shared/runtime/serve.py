@@ -8,6 +8,7 @@ import argparse
 import contextlib
 import dataclasses
 import faulthandler
+import json
 import os
 import re
 import signal
@@ -24,7 +25,8 @@ from shared.bus.base import Bus
 from shared.bus.keys import check_chunk
 from shared.clock import Clock, SystemClock
 from shared.config.site import load_section
-from shared.errors import BusError, ConfigError, RiposteError
+from shared.errors import BusError, RiposteError
+from shared.messages.topics import SERVICE_ROLES, Role
 from shared.messages.training import Agent
 from shared.runtime.build import commit
 from shared.runtime.logging import configure_logging
@@ -110,6 +112,12 @@ def parse_args(role: str, argv: Sequence[str]) -> ServeArgs:
         "--set",
         action="append",
         default=[],
+    parser.add_argument(
+        "--certificates",
+        default="",
+        metavar="DIR",
+        help="folder of riposte certs (that of the site file)",
+    )
         metavar="SECTION.KEY=VALUE",
         dest="overrides",
         help="over the site file; may be repeated",
@@ -128,7 +136,7 @@ def parse_args(role: str, argv: Sequence[str]) -> ServeArgs:
         run_id=found.run_id or run_id_of(found.run),
         connect=tuple(found.connect),
         agent=found.agent,
-        overrides=tuple(found.overrides),
+        overrides=(*found.overrides, *certificates_override(found.certificates)),
     )
 
 
@@ -137,18 +145,24 @@ def open_site_bus(args: ServeArgs, clock: Clock) -> Bus:
 
     Raises:
         BusError: no router answers.
+def certificates_override(folder: str) -> tuple[str, ...]:
+    """Return ``--certificates`` as what it says over the site file; empty says nothing."""
+    return (f"bus.certificates={json.dumps(folder)}",) if folder else ()
+
+
+def role_of(role: str) -> Role:
+    """Return whose certificate a process shows: a service its own, a command the operator's."""
+    own: dict[str, Role] = {one: one for one in SERVICE_ROLES}
+    return own.get(role.replace("-", "_"), "operator")
+
+
         ConfigError: the bus's section or an endpoint is wrong.
     """
     from shared.bus.config import BusConfig  # the session and its library: only where one is opened
     from shared.bus.zenoh import open_zenoh
 
-    cfg = args.section("bus", BusConfig)
-    if args.connect:
-        try:
-            cfg = msgspec.structs.replace(cfg, connect=args.connect)
-        except ValueError as error:
-            raise ConfigError(f"--connect: {error}") from error
-    return open_zenoh(cfg, args.name, clock, args.run_id)
+    cfg = args.section("bus", BusConfig).with_endpoints(connect=args.connect)
+    return open_zenoh(cfg, args.name, clock, args.run_id, role_of(args.role))
 
 
 def plain_loop(

@@ -6,7 +6,6 @@ person does so on the page or with `riposte robot arm`, and a real robot is neve
 """
 
 import contextlib
-import json
 import os
 import sys
 import threading
@@ -24,6 +23,7 @@ from services.jobs.play.plan import RUNS, Plan, parse, plan_of
 from services.jobs.play.processes import LIVE, processes
 from services.jobs.play.screen import Screen
 from services.jobs.play.summary import PlayedMatch, summary_of, summary_text, write_summary
+from services.jobs.status import Endpoint, write_endpoint
 from services.jobs.train.processes import StopAsked, endpoint_of, wait_for_router
 from services.jobs.who import operator
 from services.supervisor import Supervisor
@@ -118,8 +118,10 @@ class Course:
         """
         plan = self._plan
         endpoint = endpoint_of(plan.bus)
-        said = {"connect": endpoint, "run": plan.run}
-        atomic_write(plan.folder / "endpoint.json", json.dumps(said).encode())
+        write_endpoint(
+            plan.folder,
+            Endpoint(connect=endpoint, run=plan.run, certificates=plan.bus.certificates),
+        )
         supervisor = Supervisor(processes(plan, endpoint), plan.folder / "logs", self._clock)
         try:
             for event in supervisor.start():

@@ -1,7 +1,6 @@
 """Runs the processes of a run on this machine until its schedule is done, and says how it goes."""
 
 import contextlib
-import json
 import shutil
 import socket
 import threading
@@ -14,6 +13,7 @@ from typing import Protocol
 import msgspec
 import structlog
 
+from services.jobs.status import Endpoint, write_endpoint
 from services.supervisor import ProcessEvent, ProcessSpec, Supervisor
 from shared.bus.base import Bus
 from shared.bus.config import BusConfig
@@ -24,7 +24,6 @@ from shared.errors import ConfigError, RiposteError
 from shared.messages.league import Incident
 from shared.messages.topics import INCIDENT, SCHEDULE
 from shared.messages.training import Receipt
-from shared.runtime.files import atomic_write
 from shared.telemetry.door import read_live_view
 
 log = structlog.get_logger()
@@ -89,7 +88,7 @@ def run_processes(
 
     clock = SystemClock()
     endpoint = endpoint_of(cfg)
-    atomic_write(folder / "endpoint.json", json.dumps({"connect": endpoint, "run": run}).encode())
+    write_endpoint(folder, Endpoint(connect=endpoint, run=run, certificates=cfg.certificates))
     supervisor = Supervisor(specs(endpoint), folder / "logs", clock)
     try:
         started = supervisor.start()
@@ -123,7 +122,7 @@ def endpoint_of(cfg: BusConfig) -> str:
         ConfigError: another program listens there.
     """
     if cfg.listen == BusConfig().listen:  # runs side by side need a port each
-        return f"tcp/127.0.0.1:{free_port()}"
+        return f"{cfg.local_protocol}/127.0.0.1:{free_port()}"
     endpoint = cfg.listen[0]
     port = int(endpoint.rpartition(":")[2])
     if port and free_port(port) != port:

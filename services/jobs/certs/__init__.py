@@ -1,0 +1,1 @@
+"""`riposte certs`: who may speak on the bus, as certificates of an authority of the site's own."""
