@@ -65,20 +65,20 @@ def open_zenoh(
         name: of this process, unique in the run.
         clock: a clock that moves by itself.
         run: name of the run; processes of other runs are not seen.
+        role: whose certificate the process shows, where ``cfg`` has certificates.
 
     Raises:
-        role: whose certificate the process shows, where ``cfg`` has certificates.
         BusError: no router answered within ``cfg.open_seconds``.
+        ConfigError: the certificates are not there, or an endpoint does not go with them.
         ValueError: ``name`` or ``run`` cannot be part of a key.
     """
-        ConfigError: the certificates are not there, or an endpoint does not go with them.
     check_chunk("name", name)
     check_chunk("run", run)
     zenoh.init_log_from_env_or("error")
-    endpoints = ", ".join(cfg.routers)
-    began_at = clock.now()
     config = client_json(cfg, role)
     warn_of_plain_network(cfg)
+    endpoints = ", ".join(cfg.routers)
+    began_at = clock.now()
     told = False
     while True:
         try:
@@ -93,22 +93,19 @@ def open_zenoh(
             threading.Event().wait(0.1)
 
 
-class Router:
-    """A Zenoh router in this process."""
 def _no_session(cfg: BusConfig, role: Role) -> str:
     """Return what a person should look at when no session opens."""
-    where = f"no session at {', '.join(cfg.routers)} within {cfg.open_seconds:g} s"
+    where = f"no router at {', '.join(cfg.routers)} within {cfg.open_seconds:g} s"
     tls = [one for one in cfg.routers if one.startswith("tls/")]
     if cfg.certificates and tls:
         reasons = [(one, why_refused(one, files_of(cfg.certificates, role))) for one in tls]
         if said := "; ".join(f"{one}: {reason}" for one, reason in reasons if reason):
             return f"{where}: {said}"
-    return (
-        f"{where}: no router answers there; start one with `riposte router`, or name another "
-        "endpoint with --connect"
-    )
+    return f"{where}: start one with `riposte router`, or name another endpoint with --connect"
 
 
+class Router:
+    """A Zenoh router in this process."""
 
     def __init__(self, session: zenoh.Session, endpoints: tuple[str, ...]) -> None:
         self.endpoints = endpoints
@@ -158,6 +155,7 @@ class ZenohBus:
         session: zenoh.Session,
         config: str,
     ) -> None:
+        """Take over a session; ``config`` is what it was opened with, to open the next."""
         self.name = name
         self.boot = secrets.token_hex(8)
         self._clock = clock
@@ -173,7 +171,6 @@ class ZenohBus:
         )
         self._declared: dict[object, tuple[Declare, Any]] = {}
         self._present: dict[str, Present] = {}
-        """Take over a session; ``config`` is what it was opened with, to open the next."""
         self._latest = LatestSent(cfg.resend_seconds - UPKEEP_SECONDS / 2)
         self._published = 0
         self._upkeep_at = 0.0

@@ -42,8 +42,6 @@ from shared.messages.training import (
     VersionReport,
 )
 
-M = TypeVar("M", bound=Message)
-R = TypeVar("R", bound=Message)
 Role = Literal[
     "league", "learner", "actor", "recorder", "referee", "policy", "robot_io", "page", "metrics",
     "operator",
@@ -54,6 +52,8 @@ SERVICE_ROLES: tuple[Role, ...] = tuple(role for role in ROLES if role != "opera
 CERTIFIED: tuple[str, ...] = ("router", *ROLES)
 """Common names of a site's certificates; the router carries what others say."""
 
+M = TypeVar("M", bound=Message)
+R = TypeVar("R", bound=Message)
 
 
 class Qos(enum.Enum):

@@ -107,17 +107,17 @@ def parse_args(role: str, argv: Sequence[str]) -> ServeArgs:
         metavar="ENDPOINT",
         help="bus endpoint, as in tcp/127.0.0.1:7447; may be repeated",
     )
-    parser.add_argument("--agent", choices=get_args(Agent), help="whose learner this is")
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
     parser.add_argument(
         "--certificates",
         default="",
         metavar="DIR",
         help="folder of riposte certs (that of the site file)",
     )
+    parser.add_argument("--agent", choices=get_args(Agent), help="whose learner this is")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
         metavar="SECTION.KEY=VALUE",
         dest="overrides",
         help="over the site file; may be repeated",
@@ -140,11 +140,6 @@ def parse_args(role: str, argv: Sequence[str]) -> ServeArgs:
     )
 
 
-def open_site_bus(args: ServeArgs, clock: Clock) -> Bus:
-    """Return a session on the bus of ``args``.
-
-    Raises:
-        BusError: no router answers.
 def certificates_override(folder: str) -> tuple[str, ...]:
     """Return ``--certificates`` as what it says over the site file; empty says nothing."""
     return (f"bus.certificates={json.dumps(folder)}",) if folder else ()
@@ -156,6 +151,11 @@ def role_of(role: str) -> Role:
     return own.get(role.replace("-", "_"), "operator")
 
 
+def open_site_bus(args: ServeArgs, clock: Clock) -> Bus:
+    """Return a session on the bus of ``args``.
+
+    Raises:
+        BusError: no router answers.
         ConfigError: the bus's section or an endpoint is wrong.
     """
     from shared.bus.config import BusConfig  # the session and its library: only where one is opened
