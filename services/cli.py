@@ -46,6 +46,7 @@ SERVICES = (
     Command("robot-io", "robot_io.__main__", "moves a robot, through the safety gate"),
     Command("page", "page.__main__", "a live bout in a browser, and its mouse"),
 )
+    Command("metrics", "metrics.__main__", "what the processes say, for Prometheus"),
 COMMANDS = {command.name: command for command in (*JOBS, *SERVICES)}
 
 EXTRAS = {

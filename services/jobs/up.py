@@ -19,7 +19,7 @@ from shared.runtime.serve import run_id_of, stop_on_signals
 
 ROLES = (
     "router", "league", "learner", "actor", "recorder", "referee", "policy", "robot-io",
-    "page",
+    "page", "metrics",
 )  # fmt: skip
 SIDED = ("learner", "policy")
 """Roles of which each process belongs to one agent."""

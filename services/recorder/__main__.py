@@ -65,7 +65,7 @@ def open_bus(args: ServeArgs, clock: Clock) -> Bus:
 def run(service: Recorder, bus: Bus, clock: Clock, args: ServeArgs, stop: threading.Event) -> None:
     """Look at the bus at an even pace until ``stop`` is set."""
     bus.declare_alive(args.role)
-    reporter = StatusReporter(service, bus, clock, args.role)
+    reporter = StatusReporter(service, bus, clock, args.role, args.log_path)
     while not stop.wait(PACE):
         bus.wait(0.0)
         service.tick()

@@ -22,7 +22,8 @@ Table = dict[str, Any]
 SECTIONS = (
     "bus", "sim", "game", "action", "reward",
     "site", "actor", "learner", "league", "recorder", "policy", "referee", "robot_io", "safety",
-    "pr2", "vive", "heart_rate", "tones", "page", "play", "train",
+    "pr2", "vive", "heart_rate", "tones", "page", "metrics", "play",
+    "train",
 )  # fmt: skip
 """Every section a site file may have; each service reads its own."""
 

@@ -65,6 +65,11 @@ class ServeArgs:
     overrides: tuple[str, ...] = ()
     """``section.key=value``, over the site file."""
 
+    @property
+    def log_path(self) -> Path:
+        """Return the process's log file."""
+        return self.run / "logs" / f"{self.name}.jsonl"
+
     def section(self, name: str, type: type[S]) -> S:
         """Return a section of the site file with this process's overrides.
 
@@ -169,7 +174,7 @@ def plain_loop(
     service: Ticking, bus: Bus, clock: Clock, args: ServeArgs, stop: threading.Event
 ) -> None:
     """Tick until ``stop`` is set, as ``run`` says."""
-    run(service, bus, clock, args.role, stop)
+    run(service, bus, clock, args.role, stop, args.log_path)
 
 
 def serve(
@@ -213,7 +218,7 @@ def serve_plain(
     """
     args = parse_args(role, sys.argv[1:] if argv is None else argv)
     set_process_name(args.name)
-    log_path = args.run / "logs" / f"{args.name}.jsonl"
+    log_path = args.log_path
     try:
         configure_logging(
             log_path, bound={"service": args.name, "run_id": args.run_id, "commit": commit()}
