@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+import msgspec
 import numpy as np
 import structlog
 
@@ -22,6 +23,9 @@ MAX_NAME = 128
 """Longest name of a bout or a player (characters)."""
 MAX_REASON = 256
 """What is kept of a reason (characters)."""
+
+MAX_SECONDS = 600.0
+"""Longest bout that can be asked for (s)."""
 
 log = structlog.get_logger()
 
@@ -113,7 +117,16 @@ class Referee:
             if self._bout.fixture.bout == asked.bout:
                 raise ValueError(f"there has been a bout {asked.bout!r}: give a new name")
         fixture = Fixture(asked.bout, asked.antagonist, asked.protagonist)
-        bout = LiveBout(fixture, self._board(), self._tracking, self._cfg, self._timestep)
+        board = self._board()
+        if asked.seconds != 0.0:
+            if not self._timestep <= asked.seconds <= MAX_SECONDS:  # also refuses NaN
+                raise ValueError(
+                    f"a bout of {asked.seconds:g} s: {self._timestep:g} to {MAX_SECONDS:g} s can "
+                    "be judged"
+                )
+            steps = round(asked.seconds / self._timestep)
+            board.rules = msgspec.structs.replace(board.rules, bout_steps=steps)
+        bout = LiveBout(fixture, board, self._tracking, self._cfg, self._timestep)
         bout.on_event(Event.START, "", now)
         self._bout = bout
         self._counters["bouts"] += 1

@@ -87,6 +87,8 @@ class PlayRequest(Message, frozen=True, kw_only=True):
     protagonist: str = ""
     """Player references, or ``person`` (start)."""
     reason: str = ""
+    seconds: float = 0.0
+    """How long the bout is (start; s); 0 is as the rule book says."""
 
 
 class PlayReply(Message, frozen=True, kw_only=True):

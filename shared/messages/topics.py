@@ -171,8 +171,8 @@ TRACKER_RAW = Topic(
     "a Vive tracker in the base stations' frame",
 )
 OFFSET = Topic(
-    "play/{agent}/offset", DesiredOffset, Qos.STREAM, 4 * KIB, ("policy",),
-    ("robot_io", "recorder"), "where the tool should go from here",
+    "play/{agent}/offset", DesiredOffset, Qos.STREAM, 4 * KIB, ("policy", "operator"),
+    ("robot_io", "recorder", "operator"), "where the tool should go from here",
 )
 REFEREE = Topic(
     "play/referee", RefereeState, Qos.LATEST, 4 * KIB, ("referee",),

@@ -11,14 +11,14 @@ import json
 from pathlib import Path
 from typing import Any
 
+from services.jobs.robot.playable import tool_limits
 from services.robot_io.config import SafetyConfig
-from services.robot_io.scene import blade_of
 from shared.config.site import load_section
 from shared.errors import ConfigError, IdentificationError
 from shared.identification.catalogue import effects
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.excitation.arm import Arm, mjcf_arm, pr2_arm
-from shared.identification.excitation.limits import Blade, ToolLimits
+from shared.identification.excitation.limits import ToolLimits
 from shared.identification.excitation.prediction import (
     VISIBLE,
     Outlook,
@@ -108,25 +108,6 @@ def run(arguments: argparse.Namespace) -> int:
     if not arguments.json:
         print(f"\nwrote {folder}: play each command.parquet, and put what is logged beside it")
     return 0
-
-
-def tool_limits(safety: SafetyConfig, model: FencingModel) -> ToolLimits:
-    """Return what the safety gate allows."""
-    blade = blade_of(model)
-    return ToolLimits(
-        box_low=safety.box_low,
-        box_high=safety.box_high,
-        speed=safety.game_speed,
-        acceleration=safety.acceleration,
-        turn_speed=safety.turn_speed,
-        turn_acceleration=safety.turn_acceleration,
-        lead=safety.lead,
-        turn_lead=safety.turn_lead,
-        ceiling=safety.ceiling,
-        keep_out=safety.keep_out,
-        keep_out_radius=safety.keep_out_radius,
-        blade=Blade(blade.direction, blade.front, blade.back, blade.radius),
-    )
 
 
 def _arm(arguments: argparse.Namespace) -> Arm:

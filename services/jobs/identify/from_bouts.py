@@ -2,7 +2,7 @@
 
 Commands are what the safety gate sent, at the time it sent them; joints and efforts are the
 robot's, at the time they arrived; all poses are in its torso frame. One bout is one recording, the
-last quarter of the bouts is held out.
+last quarter of the bouts is held out; of a programme that was played, what it holds out.
 """
 
 import argparse
@@ -22,6 +22,7 @@ from shared.identification.dataset.logs import Log, Rows, data_set, rising
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource
 from shared.identification.dataset.writing import write_dataset
+from shared.identification.excitation.reading import AT, PosePlan, read_programme
 from shared.messages.message import Array
 from shared.sim.config import SimConfig
 from shared.sim.parameters import JOINT_NAMES
@@ -47,13 +48,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--gripper-tracker", type=Path, metavar="CALIBRATION",
         help="the Vive tracker of this calibration was on the gripper during the bouts",
     )  # fmt: skip
+    parser.add_argument(
+        "--programme", type=Path, metavar="DIR",
+        help="only its recordings, as riposte robot play-programme played them",
+    )  # fmt: skip
 
 
 def run(found: argparse.Namespace) -> int:
     """Write the data set, and say what is in it."""
     bouts = [load_bout(folder) for folder in archived_bouts(found.run)]
     calibration = load_calibration(found.gripper_tracker) if found.gripper_tracker else None
-    dataset, left_out = of_bouts(bouts, found.model, calibration)
+    plan = read_programme(found.programme) if found.programme else None
+    dataset, left_out = of_bouts(bouts, found.model, calibration, plan)
     for line in left_out:
         print(f"left out: {line}")
     write_dataset(dataset, found.out, {"by": "riposte identify from-bouts", "run": found.run.name})
@@ -75,7 +81,7 @@ def report(folder: Path) -> None:
 
 def of_bouts(
     bouts: Sequence[ArchivedBout], model: Path | None = None,
-    gripper: Calibration | None = None,
+    gripper: Calibration | None = None, plan: PosePlan | None = None,
 ) -> tuple[Dataset, list[str]]:  # fmt: skip
     """Return archived bouts as a data set, and why some are not in it.
 
@@ -83,16 +89,18 @@ def of_bouts(
         bouts: in the order they were played.
         model: the ``model.toml`` to compare with; the nominal model where it is None.
         gripper: of the Vive tracker on the robot's gripper, where it had one.
+        plan: the programme that was played; where it is None, bouts are taken as they are.
 
     Raises:
-        IdentificationError: fewer than two bouts can be used, or they were played by different
-            arms.
+        IdentificationError: a recording of the programme is missing, fewer than two bouts can be
+            used, or they were played by different arms.
     """
     logs: list[Log] = []
     left_out: list[str] = []
     arms: set[str] = set()
-    for bout in bouts:
-        log, why = _log(bout, gripper)
+    named = [(bout, "") for bout in bouts] if plan is None else _played(plan, bouts)
+    for bout, recording in named:
+        log, why = _log(bout, gripper, recording)
         if log is None:
             left_out.append(f"{bout.folder.name}: {why}")
             continue
@@ -109,10 +117,38 @@ def of_bouts(
             "the robot played with both its arms in turn: make a data set of each arm's bouts"
         )
     source = ModelSource("pr2", arm="left" if "left" in arms else "right", parameters=model)
-    return data_set(source, "pose", JOINT_NAMES, POSE, logs), left_out
+    if plan is None:
+        return data_set(source, "pose", JOINT_NAMES, POSE, logs), left_out
+    there = {log.name for log in logs}
+    held_out = [each.name for each in plan.stretches if each.split == "test"]
+    repeats = {
+        each.name: each.repeats for each in plan.stretches
+        if each.repeats in there and each.name in there
+    }  # fmt: skip
+    return data_set(source, "pose", JOINT_NAMES, POSE, logs, held_out, repeats), left_out
 
 
-def _log(bout: ArchivedBout, gripper: Calibration | None) -> tuple[Log | None, str]:
+def _played(plan: PosePlan, bouts: Sequence[ArchivedBout]) -> list[tuple[ArchivedBout, str]]:
+    """Return the last whole bout of each recording of a programme, with the recording's name.
+
+    Raises:
+        IdentificationError: one was not played to its end.
+    """
+    whole = {
+        bout.info.bout.partition(AT)[0]: bout
+        for bout in sorted(bouts, key=lambda bout: bout.info.started_at_ns)
+        if bout.info.protagonist == plan.reference and bout.info.outcome == "finished"
+    }
+    lost = [each.name for each in plan.stretches if each.name not in whole]
+    if lost:
+        raise IdentificationError(
+            f"of {plan.folder} {', '.join(lost)} was not played to its end in these {len(bouts)} "
+            f"bouts: riposte robot play-programme {plan.folder} --only {' '.join(lost)}"
+        )
+    return [(whole[each.name], each.name) for each in plan.stretches]
+
+
+def _log(bout: ArchivedBout, gripper: Calibration | None, recording: str) -> tuple[Log | None, str]:
     """Return a bout's recording, or why there is none."""
     for name in STREAMS:
         if name not in bout.streams:
@@ -132,8 +168,8 @@ def _log(bout: ArchivedBout, gripper: Calibration | None) -> tuple[Log | None, s
     if tracker is not None and _span(tracker) < SHORTEST:
         assert gripper is not None
         return None, f"tracker {gripper.serial} was seen for less than {SHORTEST:g} s"
-    name = re.sub(r"[^\w.-]", "_", bout.folder.name, flags=re.ASCII).lstrip(".-") or "bout"
-    return Log(name, command, readings, tracker), ""
+    plain = re.sub(r"[^\w.-]", "_", bout.folder.name, flags=re.ASCII).lstrip(".-") or "bout"
+    return Log(recording or plain, command, readings, tracker), ""
 
 
 def _span(rows: Rows) -> float:

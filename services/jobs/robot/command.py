@@ -1,4 +1,4 @@
-"""`riposte robot`: what a person does to the robot: check, arm, disarm, reset, calibrate."""
+"""`riposte robot`: what a person does to the robot: check, arm, disarm, reset, and more."""
 
 import argparse
 import contextlib
@@ -26,6 +26,7 @@ ABOUT = {
     "arm": "let the robot move; somebody must hold its run stop",
     "disarm": "shut the gate: the robot stays where it is",
     "reset": "after a trip: back to disarmed, once the robot is in order",
+    "play-programme": "a programme of riposte identify excite: riposte robot play-programme --help",
     "calibrate": "where a Vive's base stations stand: riposte robot calibrate --help",
 }
 PLAYED = Path("runs/latest-play")
@@ -43,6 +44,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         from services.jobs.robot import calibrate  # scipy, of the extra `robot`
 
         return calibrate.main(words[1:])
+    if words[:1] == ["play-programme"]:
+        from services.jobs.robot import play_programme  # the simulator, to check places with
+
+        return play_programme.main(words[1:])
     found = _parse(words)
     clock = SystemClock()
     with contextlib.closing(open_site_bus(place(found), clock)) as bus:
@@ -58,7 +63,7 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="riposte robot",
         description="What a person does to the robot of a match or a site.",
-        epilog="\n".join(f"{name:<9} {about}" for name, about in ABOUT.items()),
+        epilog="\n".join(f"{name:<14} {about}" for name, about in ABOUT.items()),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("action", choices=get_args(Action), metavar="|".join(get_args(Action)))

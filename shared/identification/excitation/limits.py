@@ -138,16 +138,23 @@ def hurry(limits: Limits, q: Float64, poses: Float64, period: float) -> float:
         _most(np.abs(speed) / limits.speed),
         _most(np.abs(np.diff(speed, axis=0)) / period / limits.acceleration) ** 0.5,
     ]
-    if (tool := limits.tool) is not None:
-        step = pose_error(poses[1:], poses[:-1]) / period
-        for part, most, sharpest in (
-            (step[:, :3], tool.speed, tool.acceleration),
-            (step[:, 3:], tool.turn_speed, tool.turn_acceleration),
-        ):
-            change = np.diff(part, axis=0) / period
-            found.append(_most(np.linalg.norm(part, axis=1)) / most)
-            found.append((_most(np.linalg.norm(change, axis=1)) / sharpest) ** 0.5)
+    if limits.tool is not None:
+        found.append(tool_hurry(limits.tool, poses, period))
     return float(max(found))
+
+
+def tool_hurry(tool: ToolLimits, poses: Float64, period: float) -> float:
+    """Return how many times slower poses float64[T, 7] have to be, as ``hurry`` does."""
+    found: list[float] = []
+    step = pose_error(poses[1:], poses[:-1]) / period
+    for part, most, sharpest in (
+        (step[:, :3], tool.speed, tool.acceleration),
+        (step[:, 3:], tool.turn_speed, tool.turn_acceleration),
+    ):
+        change = np.diff(part, axis=0) / period
+        found.append(_most(np.linalg.norm(part, axis=1)) / most)
+        found.append((_most(np.linalg.norm(change, axis=1)) / sharpest) ** 0.5)
+    return max(found)
 
 
 def strain(limits: Limits, efforts: Float64, period: float) -> Float64:

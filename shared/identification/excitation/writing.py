@@ -3,6 +3,7 @@
 # pyright: basic
 # (pyarrow's types are partial)
 
+import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -23,6 +24,8 @@ from shared.runtime.files import atomic_write
 
 PROGRAMME_FILE: Final = "programme.toml"
 PICTURE_FILE: Final = "programme.png"
+PROGRAMME_SCHEMA: Final = 1
+"""Of ``programme.toml``; goes up when what is played changes its meaning."""
 COMMAND_FILE: Final = "command.parquet"
 
 
@@ -50,12 +53,14 @@ def write_programme(
     """
     folder = folder.absolute()
     with whole_folder(folder) as temporary:
+        digests: dict[str, str] = {}
         for each in programme.predicted.trajectories:
             (temporary / each.name).mkdir()
             table = _table(each, programme.predicted.actuators)
+            digests[each.name] = hashlib.sha256(table).hexdigest()
             atomic_write(temporary / each.name / COMMAND_FILE, table)
         atomic_write(temporary / PICTURE_FILE, picture)
-        made = tomli_w.dumps(_programme(programme, prediction, generator))
+        made = tomli_w.dumps(_programme(programme, prediction, generator, digests))
         atomic_write(temporary / PROGRAMME_FILE, made.encode())
         manifest = tomli_w.dumps(_manifest(programme, folder, generator))
         atomic_write(temporary / FILE, manifest.encode())
@@ -88,10 +93,14 @@ def _manifest(programme: Programme, folder: Path, generator: Mapping[str, Any]) 
 
 
 def _programme(
-    programme: Programme, prediction: Prediction, generator: Mapping[str, Any]
+    programme: Programme,
+    prediction: Prediction,
+    generator: Mapping[str, Any],
+    digests: Mapping[str, str],
 ) -> dict[str, Any]:
     joints = programme.predicted.joints
     return {
+        "schema": PROGRAMME_SCHEMA,
         "generator": dict(generator),
         "seconds": round(programme.seconds, 3),
         "home": dict(zip(joints, programme.arm.home.tolist(), strict=True)),
@@ -103,6 +112,7 @@ def _programme(
                 "repeats": part.plan.repeats,
                 "shows": SHOWS[part.plan.kind],
                 "seconds": round(float(part.at[-1]), 3),
+                "sha256": digests[part.plan.name],
                 "lead_m": round(float(lead[0]), 4),
                 "lead_rad": round(float(lead[1]), 4),
                 "effort_share": {

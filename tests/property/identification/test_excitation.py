@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from services.jobs.identify.excite import tool_limits
+from services.jobs.robot.playable import tool_limits
 from services.robot_io.config import SafetyConfig
 from services.robot_io.limits import Space
 from services.robot_io.poses import distance, length, pose_of, rotation_between

@@ -94,7 +94,7 @@ class Stand:
             self.referee.tick()
         return self.state
 
-    def ask(self, action: str, bout: str = "one", **fields: str) -> PlayReply:
+    def ask(self, action: str, bout: str = "one", **fields: object) -> PlayReply:
         request = PlayRequest(action=action, bout=bout, **fields)  # type: ignore[arg-type]
         pending = self.bus.ask(BOUT, request, 1.0)
         self.referee.tick()
@@ -102,10 +102,12 @@ class Stand:
         assert isinstance(answer, PlayReply), answer
         return answer
 
-    def start(self, bout: str = "one") -> PlayReply:
+    def start(self, bout: str = "one", seconds: float = 0.0) -> PlayReply:
         """Bring enough good states, and start a bout."""
         self.bring(APART, 25)
-        return self.ask("start", bout, antagonist="person", protagonist="scripted:guard")
+        return self.ask(
+            "start", bout, antagonist="person", protagonist="scripted:guard", seconds=seconds
+        )
 
     @property
     def state(self) -> RefereeState:

@@ -284,3 +284,15 @@ def test_its_health_says_what_is_played_and_whom_it_waits_for():
     assert health.state == "running 'one': 3 after 0.03 s"
     assert health.waiting_for == ""
     assert health.rates["states_per_s"] > 5
+
+
+def test_who_starts_a_bout_may_say_how_long_it_is():
+    stand = Stand(bout_steps=5)
+    assert stand.start(seconds=0.08).accepted
+    assert stand.bring(HIT, 7).phase == "running"
+    assert (stand.bring(HIT).phase, stand.state.step) == ("finished", 8)
+    reply = stand.start("next", seconds=1000.0)
+    assert not reply.accepted
+    assert "a bout of 1000 s: 0.01 to 600 s" in reply.reason
+    assert stand.start("last").accepted
+    assert stand.bring(HIT, 5).phase == "finished"
