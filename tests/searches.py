@@ -16,7 +16,7 @@ from shared.identification.space import Space
 from tests.measured import measure, problem_of
 
 ELBOW, LIFT = Candidate(BIAS, "elbow"), Candidate(BIAS, "lift")
-DRAG = Candidate(VISCOUS, "elbow")
+DRAG, OFFSET = Candidate(VISCOUS, "elbow"), Candidate(BIAS, "pan")
 
 
 class Searches:
@@ -50,9 +50,11 @@ class Searches:
     def search(
         self, base: Float64, accepted: Tried | None = None, rivals: tuple[Tried, ...] = (),
         doubted: tuple[str, ...] = (), tried: tuple[Tried, ...] = (),
+        before: tuple[Tried, ...] = (),
     ) -> Search:  # fmt: skip
-        """Return a search that is over."""
-        taken = () if accepted is None else (accepted,)
+        """Return a search that is over; ``before`` was accepted first, without a rival."""
+        taken = before if accepted is None else (*before, accepted)
+        current = self.fit(tuple(each.candidate for each in taken)) if before else None
         looked = (*taken, *rivals, *tried)
         return Search(
             problem=self.problem,
@@ -63,12 +65,12 @@ class Searches:
             base=self.base,
             nominal=Start(self.base.z, self.base.jacobian),
             parts=self.base,
-            current=self.base if accepted is None else accepted.fit,
+            current=current or (self.base if accepted is None else accepted.fit),
             nominal_losses=base,
             base_losses=base,
             current_losses=base if accepted is None else accepted.losses,
             screened={each.candidate.label: each.screened for each in looked},
             tried={each.candidate.label: each for each in looked},
             accepted=list(taken),
-            rivals=[rivals] if taken else [],
+            rivals=[() for _ in before] + ([] if accepted is None else [rivals]),
         )

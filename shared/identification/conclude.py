@@ -55,13 +55,15 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
     """
     held_out = _held_out(found)
     widths = half_widths(found.current, found.problem.of("train"))
-    causes = causes_of(found, widths)
-    ties = ties_of(found, causes)
+    accepted = causes_of(found, widths)
+    ties = ties_of(found, accepted)
     word = _word(found, ties, left)
+    sure = tuple(cause for cause, rivals in zip(accepted, found.rivals, strict=True) if not rivals)
+    told = accepted if word == "unexplained" else sure
     return Conclusion(
         word=word,
-        sentence=sentence_of(word, causes, ties, held_out, left),
-        causes=causes if word == "named" else (),
+        sentence=sentence_of(word, told, ties, held_out, left),
+        causes=sure if word in ("named", "tie") else (),
         ties=ties if word == "tie" else (),
         held_out=held_out,
         candidates=_scored(found, word),
@@ -74,13 +76,20 @@ def extended(found: Search) -> Variant:
     return found.current.space.variant(found.current.z)
 
 
-def _word(found: Search, ties: tuple[Tie, ...], left_over: tuple[Unexplained, ...]) -> Word:
+def is_open(found: Search) -> bool:
+    """Return whether more is left than a verdict that names causes, or none, may leave."""
     base, left = float(found.base_losses.mean()), float(found.current_losses.mean())
     if found.accepted:
-        if left > max(BESIDE_A_NAME, MAY_BE_LEFT * base):
+        return left > max(BESIDE_A_NAME, MAY_BE_LEFT * base)
+    return base > NEARLY_NOISE
+
+
+def _word(found: Search, ties: tuple[Tie, ...], left: tuple[Unexplained, ...]) -> Word:
+    if found.accepted:
+        if is_open(found):
             return "unexplained"
         return "tie" if ties else "named"
-    if base <= NEARLY_NOISE and not _stands_out(left_over):
+    if not is_open(found) and not _stands_out(left):
         return "none"
     return "base_too_coarse" if found.doubted else "unexplained"
 

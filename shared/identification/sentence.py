@@ -13,14 +13,16 @@ def sentence_of(
     """Return the verdict for people."""
     ratio = f"{held_out.base_fit:.2f} times the noise"
     if word == "named":
-        names = " and ".join(f"{cause.title}{_where(cause)} ({_size(cause)})" for cause in causes)
         return (
-            f"What the simulation gets wrong: {names}. Held out, the residual goes from {ratio} "
-            f"to {held_out.extended:.2f}."
+            f"What the simulation gets wrong: {_named(causes)}. Held out, the residual goes from "
+            f"{ratio} to {held_out.extended:.2f}."
         )
     if word == "tie":
-        names = " or ".join(label(cause) for cause in ties[0].causes)
-        return f"These recordings do not tell apart: {names}. {ties[0].record}"
+        either = " or ".join(label(cause) for cause in ties[0].causes)
+        told = f"These recordings do not tell apart: {either}. {ties[0].record}"
+        if not causes:
+            return told
+        return f"What the simulation surely gets wrong: {_named(causes)}. Beside it: {told}"
     if word == "none":
         return f"Nothing to name: with its base fitted the simulation is at {ratio}."
     if word == "base_too_coarse":
@@ -42,6 +44,10 @@ def label(cause: Cause) -> str:
     """Return what and where a cause is, in plain words."""
     words = cause.effect.replace("_", " ")
     return f"{words} of {cause.where}" if cause.where else words
+
+
+def _named(causes: tuple[Cause, ...]) -> str:
+    return " and ".join(f"{cause.title}{_where(cause)} ({_size(cause)})" for cause in causes)
 
 
 def _where(cause: Cause) -> str:

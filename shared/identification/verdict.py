@@ -72,6 +72,9 @@ class Unexplained(_Part, frozen=True, kw_only=True):
     torque: float | None = None
     """Joint torque that would do the same, root mean square; None behind the encoders."""
     torque_unit: str = ""
+    is_external: bool = False
+    """Whether it looks like something outside that pushed the arm: a torque of one sign that was
+    missing for a moment, whatever the joint did."""
 
 
 class HeldOut(_Part, frozen=True, kw_only=True):
@@ -127,7 +130,8 @@ class Verdict(_Part, frozen=True, kw_only=True):
     sentence: str
     """The verdict for people, in one or two sentences."""
     causes: tuple[Cause, ...]
-    """In the order in which they were found, largest first; empty unless ``named``."""
+    """In the order in which they were found, largest first. Those of a ``tie`` are beside it, each
+    surely there itself; empty for any other verdict but ``named``."""
     ties: tuple[Tie, ...]
     unexplained: tuple[Unexplained, ...]
     held_out: HeldOut

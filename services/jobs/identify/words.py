@@ -21,9 +21,11 @@ MINUS = "\N{MINUS SIGN}"
 
 def title_text(verdict: Verdict) -> str:
     """Return what came out, in a few words."""
-    if len(verdict.causes) > 1:
-        return f"{len(verdict.causes)} causes were found"
-    return TITLES[verdict.verdict]
+    count = len(verdict.causes)
+    found = f"{count} causes were found" if count > 1 else TITLES["named"]
+    if verdict.verdict == "tie" and count:
+        return f"{found}, and one of several beside"
+    return found if count else TITLES[verdict.verdict]
 
 
 def number_text(value: float, digits: int = 3) -> str:

@@ -3,6 +3,7 @@
 import functools
 import html
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import msgspec
@@ -11,7 +12,7 @@ import pytest
 from services.jobs.identify import words
 from services.jobs.identify.page import About, report_page
 from shared.identification.verdict import Word
-from tests.unit.identify_job.examples import JOINTS, WORDS, Example, example
+from tests.unit.identify_job.examples import FRICTION, JOINTS, WORDS, Example, example
 
 HOSTILE = (
     "<script>alert(1)</script>", "a&b \"quoted\" 'name'", "$\\frac{$", "_hidden", "関節 \u0007",
@@ -132,6 +133,19 @@ def test_both_causes_of_a_tie_and_what_tells_them_apart_are_there() -> None:
         assert any(row[:1] == [cause.title] for row in page.rows)
     assert tie.record in page.text
     assert "alike to 0.998" in page.text
+
+
+@pytest.mark.slow
+def test_a_sure_cause_is_shown_beside_a_tie() -> None:
+    found = example("tie")
+    verdict = msgspec.structs.replace(found.verdict, causes=(FRICTION,))
+    page = read(replace(found, verdict=verdict))
+    assert "A cause was found, and one of several beside" in page.text
+    assert FRICTION.signature in page.text
+    assert "The cause" in page.text
+    assert "One of these" in page.text
+    for cause in verdict.ties[0].causes:
+        assert any(row[:1] == [cause.title] for row in page.rows)
 
 
 def test_every_base_parameter_is_there_before_and_after() -> None:

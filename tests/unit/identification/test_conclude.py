@@ -56,6 +56,19 @@ def test_causes_that_do_as_well_are_a_tie(searches: Searches):
     assert "torque bias of elbow or torque bias of lift" in found.sentence
 
 
+def test_a_sure_cause_is_listed_beside_a_tie(searches: Searches):
+    sure = searches.tried(DRAG, _BAD, 0.4 * _BAD)
+    one, other = (searches.tried(each, 0.4 * _BAD, _GOOD) for each in (ELBOW, LIFT))
+    found = conclude(searches.search(_BAD, one, (other,), before=(sure,)), ())
+    assert found.word == "tie"
+    assert [(each.effect, each.where) for each in found.causes] == [("viscous_friction", "elbow")]
+    (tie,) = found.ties
+    assert [each.where for each in tie.causes] == ["elbow", "lift"]
+    assert "surely gets wrong" in found.sentence
+    assert "torque bias of elbow or torque bias of lift" in found.sentence
+    assert {each.effect: each.why_not for each in found.candidates}["viscous_friction"] == ""
+
+
 def test_much_that_no_effect_takes_off_is_unexplained(searches: Searches):
     tried = searches.tried(ELBOW, _BAD, _BAD)
     found = conclude(searches.search(_BAD, tried=(tried,)), (_PUSH,))
