@@ -136,7 +136,7 @@ class CheckpointStore:
             arrays = load(payload)
         except OSError as error:
             raise CheckpointError(f"cannot read {path}: {error.strerror}") from None
-        except (msgspec.MsgspecError, SafetensorError, KeyError, TypeError, ValueError) as error:
+        except (SafetensorError, KeyError, TypeError, ValueError, RecursionError) as error:
             text = " ".join(str(error).split())
             raise CheckpointError(f"checkpoint {path} is damaged: {text}") from None
         for field, wanted in (("schema", SCHEMA), ("run", self._run), ("agent", self._agent)):

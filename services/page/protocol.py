@@ -109,7 +109,7 @@ def parse_ask(text: str) -> Ask:
     """
     try:
         ask = _ASKS.decode(text)
-    except (msgspec.MsgspecError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise MessageError(f"a wish cannot be read: {error}") from None
     if isinstance(ask, StatsAsk):
         for name in ask.__struct_fields__:

@@ -3,8 +3,9 @@
 import re
 from collections.abc import Sequence
 
-_HEADER = re.compile(r"\s*\[\[?\s*(?P<name>[^\]]+?)\s*\]\]?\s*(#.*)?\Z")
-_KEY = re.compile(r"\s*(?P<name>[\w\"'.\s-]+?)\s*=")
+# Of a stripped line; possessive, for a line of spaces must not be tried in every way there is.
+_HEADER = re.compile(r"\[\[?+(?P<name>[^\]]++)\]\]?+\s*+(#.*)?+\Z")
+_KEY = re.compile(r"(?P<name>[\w\"'.\s-]++)=")
 
 
 def line_of(text: str, keys: Sequence[str]) -> int:
@@ -16,6 +17,7 @@ def line_of(text: str, keys: Sequence[str]) -> int:
     best, best_depth = 0, 0
     wanted = tuple(keys)
     for number, line in enumerate(text.splitlines(), start=1):
+        line = line.strip()
         if header := _HEADER.match(line):
             table = found = _split(header["name"])
         elif assignment := _KEY.match(line):

@@ -43,7 +43,7 @@ def load(folder: Path, dataset: Dataset, seed: int) -> SavedFits | None:
     """Return the base fit of the same data, model and seed; None if there is none."""
     try:
         kept = msgspec.json.decode((folder / FILE).read_bytes(), type=_Saved)
-    except (OSError, UnicodeDecodeError, msgspec.MsgspecError):
+    except (OSError, ValueError, RecursionError):
         return None
     same = (kept.schema, kept.dataset, kept.model, kept.seed)
     if same != (SCHEMA, dataset.hash, repr(dataset.source), seed):

@@ -12,6 +12,7 @@ from typing import Final, Literal, TypeVar, get_args
 import msgspec
 import tomli_w
 
+from shared.config import toml
 from shared.errors import ConfigError
 from shared.sim.config import JointName
 
@@ -257,12 +258,12 @@ def load_parameters(source: str | Path) -> ModelParameters:
                 f'there is no model called "{source}": use "nominal" or the path of a model.toml'
             )
     try:
-        return msgspec.toml.decode(path.read_bytes(), type=ModelParameters)
+        return toml.decode(path.read_bytes(), ModelParameters)
     except OSError as error:
         raise ConfigError(f"cannot read the model {path}: {error.strerror}") from error
     except msgspec.ValidationError as error:
         raise ConfigError(f"{path}: {_readable(str(error))}") from error
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise ConfigError(f"{path} is not TOML: {error}") from error
 
 

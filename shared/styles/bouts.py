@@ -162,7 +162,7 @@ def load(path: Path) -> BoutTable:
                 "write it again with: riposte tournament RUN"
             )
         header = msgspec.json.decode(text, type=_Header)
-    except (KeyError, UnicodeDecodeError, msgspec.MsgspecError) as error:
+    except (KeyError, ValueError, RecursionError) as error:
         raise _damaged(path, f"its metadata says nothing of a tournament: {error}") from None
     return _table(found, path, header)
 

@@ -17,6 +17,7 @@ from typing import Annotated, Literal
 import msgspec
 import tomli_w
 
+from shared.config import toml
 from shared.errors import SnapshotError
 from shared.policy.snapshot import MAX_BYTES, Snapshot, unpack
 from shared.runtime.files import atomic_write
@@ -183,11 +184,11 @@ def shipped_bundle() -> Path:
 
 def _decode(text: bytes, path: Path) -> Bundle:
     try:
-        version = msgspec.toml.decode(text, type=dict[str, object]).get("schema")
+        version = toml.parse(text).get("schema")
         if version != SCHEMA:
             raise SnapshotError(f"{path} has schema {version}, this build reads schema {SCHEMA}")
-        return msgspec.toml.decode(text, type=Bundle)
-    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        return toml.decode(text, Bundle)
+    except ValueError as error:
         raise SnapshotError(
             f"{path} is no bundle: {error}; write it again with: riposte styles RUN"
         ) from None

@@ -267,7 +267,7 @@ def read_info(folder: Path) -> BoutInfo:
             f"{folder} is no archived bout (no {INFO_FILE}: {error.strerror or error}); "
             "name a folder in RUN/bouts"
         ) from None
-    except msgspec.MsgspecError as error:
+    except (ValueError, RecursionError) as error:
         raise RiposteError(f"{path} is damaged: {error}") from None
 
 

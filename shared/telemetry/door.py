@@ -33,7 +33,7 @@ def read_live_view(folder: Path) -> LiveView | None:
     """Return where a run can be watched, None where nobody shows it."""
     try:
         return msgspec.json.decode((folder / VIEWER_FILE).read_bytes(), type=LiveView)
-    except (OSError, msgspec.MsgspecError):
+    except (OSError, ValueError, RecursionError):
         return None
 
 

@@ -20,7 +20,7 @@ def read_page_url(folder: Path) -> str | None:
     try:
         place = msgspec.json.decode((folder / FILE).read_bytes(), type=_Place)
         os.kill(place.pid, 0)
-    except (OSError, msgspec.MsgspecError):
+    except (OSError, ValueError, RecursionError, OverflowError):
         return None
     return place.url
 

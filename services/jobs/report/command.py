@@ -165,7 +165,7 @@ def _earlier_origin(folder: Path) -> Origin | None:
     """Return what an earlier report of a finished run said made it: this machine may be another."""
     try:
         earlier = msgspec.json.decode((folder / "summary.json").read_bytes(), type=Summary)
-    except (OSError, msgspec.MsgspecError):
+    except (OSError, ValueError, RecursionError):
         return None
     return earlier.origin if earlier.finished else None
 

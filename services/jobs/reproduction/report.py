@@ -170,7 +170,7 @@ def _pipeline_times(path: Path) -> tuple[Stage, ...]:
     """Return the stages after training, of a run begun with its whole pipeline."""
     try:
         return msgspec.json.decode(path.read_bytes(), type=Pipeline).stages
-    except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
+    except (OSError, ValueError, RecursionError):
         return ()
 
 

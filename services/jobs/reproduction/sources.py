@@ -176,8 +176,12 @@ def styles_part(folder: Path, missing: list[Missing]) -> Styles | None:
     except ImportError as error:
         missing.append(Missing(part="styles", command=INSTALL, reason=str(error)))
         return None
-    except (OSError, msgspec.MsgspecError, UnicodeDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         reason = f"{path} cannot be read ({error})"
+        missing.append(Missing(part="styles", command=command, reason=reason))
+        return None
+    if len(found.information) < KEPT or len(found.information_of_bouts) < KEPT:
+        reason = f"{path} has fewer than {KEPT} numbers of components"
         missing.append(Missing(part="styles", command=command, reason=reason))
         return None
     apart = found.selected_apart
@@ -218,12 +222,13 @@ def exploitability_part(
     for path in sorted((folder / "exploitability").glob("*.json")):
         try:
             kept = json.loads(path.read_bytes())
-            opponent, budget, score = kept["opponent"], kept["budget"], float(kept["score"])
-        except (OSError, ValueError, KeyError, TypeError) as error:
+            opponent, score = str(kept["opponent"]), float(kept["score"])
+            budget = int(kept["budget"])
+        except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             reason = f"{path} is no best response ({error}): delete it"
             missing.append(Missing(part="exploitability", command=command, reason=reason))
             return ()
-        by_player.setdefault(str(opponent), {}).setdefault(int(budget), []).append(score)
+        by_player.setdefault(opponent, {}).setdefault(budget, []).append(score)
     found: list[Exploited] = []
     for ref, (number, name) in names.items():
         if ref not in by_player:

@@ -108,7 +108,7 @@ def trained_by(folder: Path) -> str:
     try:
         known = msgspec.json.decode((folder / "summary.json").read_bytes(), type=dict[str, object])
         command = msgspec.convert(known["origin"], dict[str, object])["command"]
-    except (OSError, msgspec.MsgspecError, KeyError):
+    except (OSError, ValueError, RecursionError, KeyError):
         command = ""
     config = f"{_place(folder)}/config.toml"
     again = ["riposte", "train", config, "--phase", "all", "--out", "AGAIN"]

@@ -96,7 +96,7 @@ def plan_of(folder: Path, state: RunState) -> Plan:
     """Return the plan of a tournament; without its file the names are short."""
     try:
         return msgspec.json.decode((folder / PLAN_FILE).read_bytes(), type=Plan)
-    except (OSError, UnicodeDecodeError, msgspec.MsgspecError):
+    except (OSError, ValueError, RecursionError):
         pairs = list(state.evaluations)
         return Plan(
             run=state.run,

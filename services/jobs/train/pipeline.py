@@ -58,7 +58,7 @@ def is_begun(folder: Path) -> bool:
 
 def read(folder: Path) -> Pipeline:
     """Return how far a run's pipeline is; nothing is done where the file is missing or damaged."""
-    with contextlib.suppress(OSError, msgspec.MsgspecError):
+    with contextlib.suppress(OSError, ValueError, RecursionError):
         return msgspec.json.decode((folder / FILE).read_bytes(), type=Pipeline)
     return Pipeline()
 

@@ -279,7 +279,7 @@ def _read(path: Path) -> tuple[Cut, dict[str, Any]]:
         arrays = load(payload)
     except OSError as error:
         raise CheckpointError(f"cannot be read: {error.strerror}") from None
-    except (msgspec.MsgspecError, SafetensorError, KeyError, TypeError, ValueError) as error:
+    except (SafetensorError, KeyError, TypeError, ValueError, RecursionError) as error:
         raise CheckpointError(f"damaged: {' '.join(str(error).split())}") from None
     if _digest(arrays) != cut.arrays:
         raise CheckpointError("damaged: its arrays are not those saved")

@@ -118,7 +118,7 @@ class SoundCard:
             self._hang_up()
         before = self._report
         for line in iter(lambda: child.stdout.readline(MAX_LINE), b""):  # type: ignore[union-attr]
-            with contextlib.suppress(msgspec.MsgspecError):
+            with contextlib.suppress(ValueError, RecursionError):
                 report = msgspec.json.decode(line, type=Report)
                 self._take(
                     msgspec.structs.replace(

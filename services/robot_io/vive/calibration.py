@@ -11,6 +11,7 @@ import msgspec
 import tomli_w
 
 from services.robot_io.poses import Pose, Quaternion, Vector, is_pose, unit
+from shared.config import toml
 from shared.errors import ConfigError
 from shared.runtime.files import atomic_write
 
@@ -94,12 +95,12 @@ def load_calibration(path: Path) -> Calibration:
         ConfigError: it is missing, damaged, of another schema, or not made of numbers.
     """
     try:
-        found = msgspec.toml.decode(path.read_bytes(), type=Calibration)
+        found = toml.decode(path.read_bytes(), Calibration)
     except FileNotFoundError as error:
         raise ConfigError(f"no calibration {path}: {ADVICE}") from error
     except OSError as error:
         raise ConfigError(f"cannot read the calibration {path}: {error.strerror}") from error
-    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise ConfigError(f"the calibration {path} is damaged ({error}): {ADVICE}") from error
     if found.schema != SCHEMA:
         raise ConfigError(

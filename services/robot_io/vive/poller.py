@@ -47,7 +47,7 @@ def unpacked(data: bytes) -> Sample | Report | None:
         return Sample(at, Pose((x, y, z), (a, b, c, d)))
     try:
         return msgspec.json.decode(data, type=Report)
-    except msgspec.MsgspecError:
+    except (ValueError, RecursionError):
         return None
 
 

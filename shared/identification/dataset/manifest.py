@@ -2,12 +2,12 @@
 
 import math
 import re
-import tomllib
 from pathlib import Path
 from typing import Any, Final, Literal
 
 import msgspec
 
+from shared.config import toml
 from shared.config.location import line_of
 from shared.config.site import nearest
 from shared.errors import IdentificationError
@@ -125,10 +125,8 @@ def _parse(path: Path, data: bytes) -> tuple[str, dict[str, Any]]:
     except UnicodeDecodeError as error:
         raise IdentificationError(f"{path} is not UTF-8 text ({error})") from None
     try:
-        return text, tomllib.loads(text)
-    except RecursionError:
-        raise IdentificationError(f"{path}: not TOML: nested too deeply") from None
-    except ValueError as error:  # TOMLDecodeError, and integers of thousands of digits
+        return text, toml.parse(text)
+    except ValueError as error:
         raise IdentificationError(f"{path}: not TOML: {error}") from None
 
 

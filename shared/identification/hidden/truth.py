@@ -6,6 +6,7 @@ from typing import Final
 import msgspec
 import tomli_w
 
+from shared.config import toml
 from shared.errors import IdentificationError
 
 FILE: Final = "truth.toml"
@@ -66,8 +67,8 @@ def read_truth(folder: Path) -> Truth:
     """
     path = folder / FILE
     try:
-        return msgspec.toml.decode(path.read_bytes(), type=Truth)
+        return toml.decode(path.read_bytes(), Truth)
     except OSError as error:
         raise IdentificationError(f"cannot read {path}: {error.strerror}") from None
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise IdentificationError(f"{path} is damaged: {error}") from None
