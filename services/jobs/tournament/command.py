@@ -184,6 +184,11 @@ def _check_continued(found: argparse.Namespace, folder: Path, state: RunState) -
     planned = max(record.planned for record in state.evaluations.values())
     check_asked(state, [("--bouts", found.bouts, planned), ("--seed", found.seed, state.seed)])
     players = {ref for pair in state.evaluations for ref in pair}
+    if found.against == "scripted" and not any(ref.startswith("scripted:") for ref in players):
+        raise ConfigError(
+            "this tournament was begun without the scripted players; leave --against out to "
+            "continue it, or choose another folder with --out"
+        )
     if missing := [ref for ref in found.players if ":" in ref and ref not in players]:
         raise ConfigError(
             f"this tournament was begun without {missing[0]}; leave --players out to continue "

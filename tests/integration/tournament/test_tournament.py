@@ -70,3 +70,6 @@ def test_a_finished_tournament_is_not_played_again(finished: Path):
     done = riposte(["tournament", str(finished), "--bouts", "13"])
     assert done.returncode == 2
     assert "begun with --bouts 12, not 13" in one_line(done.stderr)
+    done = riposte(["tournament", str(finished), "--against", "scripted"])
+    assert done.returncode == 2
+    assert "begun without the scripted players" in one_line(done.stderr)
