@@ -57,9 +57,7 @@ def filled(word: str) -> str:
 def shell_lines(text: str) -> Iterator[list[str]]:
     """The simple commands of a script that call riposte, words only."""
     for line in text.replace("\\\n", " ").splitlines():
-        if re.match(
-            r"\s*(srun .*|sudo .*|kubectl .*-- |[\w/$\".-]*/bin/)?(\S*/)?riposte\"? ", line
-        ):
+        if re.match(r"\s*(srun .*|sudo )?(\S*/)?riposte\"? ", line):
             words = shlex.split(line, comments=True)
             at = next(k for k, word in enumerate(words) if word.rpartition("/")[2] == "riposte")
             yield words[at + 1 :]
