@@ -22,10 +22,10 @@ import psutil
 from benchmarks.control import Site, live_site, on_cores
 from benchmarks.harness import ROOT
 from benchmarks.soaking import page
-from benchmarks.soaking.samples import Ended, Sample, disk_use, read, use_of
+from benchmarks.soaking.samples import Ended, Sample, Started, disk_use, read, use_of
 from benchmarks.soaking.verdict import Verdict, judge
 from benchmarks.training_run import ENDLESS, WARM_VERSION, TrainingRun, training_run
-from services.jobs.bench import describe_machine
+from services.jobs.doctor.machine import processor
 from services.learner.config import LearnerConfig
 from shared.errors import ConfigError, RiposteError
 from shared.runtime.build import commit
@@ -68,6 +68,7 @@ def sample(at: float, training: TrainingRun, site: Site) -> Sample:
         ticks_lost=counts.get("ticks_lost", 0),
         bouts=site.match.finished,
         disk_bytes={"train": disk_use(training.folder), "play": disk_use(site.folder)},
+        load=os.getloadavg()[0],
     )
 
 
@@ -87,6 +88,10 @@ def soak(path: Path, minutes: float, every: float) -> None:
         every: seconds between two samples.
     """
     cores = sorted(os.sched_getaffinity(0))
+    started = Started(
+        minutes=minutes, cores=len(cores), processor=processor(), commit=commit() or "unknown"
+    )
+    path.write_bytes(msgspec.json.encode(started) + b"\n")
     try:
         with on_cores(*(cores[1:] or cores)), training_run(ENDLESS) as training:
             training.wait_for_version(WARM_VERSION)
@@ -112,26 +117,24 @@ def _watch(path: Path, training: TrainingRun, site: Site, seconds: float, every:
                 due_at += every
                 line = sample(now - begin, training, site)
                 file.write(msgspec.json.encode(line) + b"\n")
-                if shutil.disk_usage(path).free < LEAST_FREE_BYTES:
-                    raise RiposteError("the disk is nearly full")
+                if shutil.disk_usage(site.folder).free < LEAST_FREE_BYTES:
+                    raise RiposteError(f"the disk of {site.folder} is nearly full")
 
 
-def report(path: Path, command: str, load_before: tuple[float, float, float], out: bool) -> Verdict:
+def report(path: Path, *, write: bool) -> Verdict:
     """Print the verdict on a file of samples; write it into the page when asked to.
 
     Raises:
         ConfigError: there is too little in it.
     """
-    samples, ended = read(path)
+    kept = read(path)
     try:
-        verdict = judge(samples, ended)
+        verdict = judge(kept.samples, kept.ended)
     except ValueError as error:
-        raise ConfigError(f"{path}: {error}{f' ({ended})' if ended else ''}") from error
+        raise ConfigError(f"{path}: {error}{f' ({kept.ended})' if kept.ended else ''}") from error
     print(page.text_of(verdict))
-    if out:
-        machine = describe_machine(load_before)
-        facts = msgspec.to_builtins(machine) | {"quiet": machine.is_quiet}
-        page.write(PAGE, page.block_of(verdict, facts, commit() or "unknown", command))
+    if write:
+        page.write(PAGE, page.block_of(verdict, kept))
     return verdict
 
 
@@ -146,14 +149,12 @@ def main() -> int:
     parser.add_argument("--write", action="store_true", help="write docs/reliability.md")
     found = parser.parse_args()
     configure_logging(None)
-    load_before = os.getloadavg()
     try:
         path = found.read or _new_file(found.out)
         if found.read is None:
             print(f"soaking for {found.minutes:g} minutes; samples in {path}", flush=True)
             soak(path, found.minutes, found.every)
-        command = f"make soak SOAK_MINUTES={found.minutes:g}"
-        verdict = report(path, command, load_before, found.write)
+        verdict = report(path, write=found.write)
     except ConfigError as error:
         print(f"soak: {error}", file=sys.stderr)
         return 2

@@ -48,6 +48,8 @@ def under(
 ) -> Rollout:  # fmt: skip
     """Return the rollout as if this actor had played it under its lease just now.
 
+    Its bouts get numbers of their own, for a learner refuses a stretch of play that it had before.
+
     Args:
         rollout: as recorded.
         lease: for training.
@@ -62,4 +64,5 @@ def under(
         rollout, agent=lease.stage.agent, actor=actor, boot=boot, sequence=sequence,
         lease=lease.lease, stage=lease.stage.index, opponent=lease.stage.opponent, seed=lease.seed,
         policy_version=version, snapshot=snapshot,
+        bouts=rollout.bouts + sequence * (int(rollout.bouts.max()) + 1),
     )  # fmt: skip

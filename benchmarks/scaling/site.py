@@ -18,9 +18,10 @@ import msgspec
 import psutil
 
 from benchmarks.scaling.synthetic import Totals
-from benchmarks.training_run import RunReader
+from benchmarks.training_run import ENDLESS, RunReader
 from services.jobs.settings import Settings
 from services.jobs.train.command import processes
+from services.league.config import LeagueConfig
 from services.supervisor import ProcessSpec, Supervisor
 from shared.bus.ports import free_port
 from shared.clock import SystemClock
@@ -29,35 +30,48 @@ from shared.errors import RiposteError
 START_SECONDS = 240.0
 POLL_SECONDS = 0.2
 LEARNER = "learner-antagonist"
-ENDLESS = ("league.antagonist_updates=1000000", "league.convergence_min_updates=0")
+ROLLOUT_STEPS = 40
+LEASE_SECONDS = LeagueConfig().lease_seconds
 OVER_SOCKETS = ("bus.shared_memory=false", "train.record=false", "recorder.live=false")
 
 
 @dataclasses.dataclass(frozen=True)
-class Crowd:
-    """Which synthetic actors a site has, and what its learner does."""
+class Setup:
+    """What a site's learner is for."""
 
-    actors: int
-    rollouts_per_s: float
-    """Offered by all of them together; 0: as many as are acknowledged."""
+    name: str
     batch_rollouts: int
     """In one update."""
     num_envs: int
     """Bouts in a rollout of 40 steps."""
-    hosts: int = 2
-    """Processes they share."""
     updates: bool = False
     """Whether the learner runs PPO."""
+
+    @property
+    def rollout_samples(self) -> int:
+        """Return the samples in one rollout."""
+        return self.num_envs * ROLLOUT_STEPS
+
+    @property
+    def batch_samples(self) -> int:
+        """Return the samples in one update."""
+        return self.batch_rollouts * self.rollout_samples
+
+
+@dataclasses.dataclass(frozen=True)
+class Crowd:
+    """Which synthetic actors a site has."""
+
+    actors: int
+    rollouts_per_s: float
+    """Offered by all of them together; 0: as many as are acknowledged."""
+    hosts: int = 2
+    """Processes they share."""
 
     @property
     def period(self) -> float:
         """Return the seconds between two rollouts of one actor."""
         return self.actors / self.rollouts_per_s if self.rollouts_per_s else 0.0
-
-    @property
-    def batch_samples(self) -> int:
-        """Return the samples in one update."""
-        return self.batch_rollouts * self.num_envs * 40
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,40 +89,76 @@ class Moment:
 
 
 class ScalingSite(RunReader):
-    """Router, league, learners and hosts of synthetic actors, all running."""
+    """Router, league and learners, all running, and at most one crowd of synthetic actors."""
 
-    def __init__(self, specs: list[ProcessSpec], folder: Path, crowd: Crowd) -> None:
+    def __init__(
+        self, specs: list[ProcessSpec], folder: Path, setup: Setup, endpoint: str, rollout: Path,
+        lease_seconds: float,
+    ) -> None:  # fmt: skip
         super().__init__(folder)
-        self.crowd = crowd
+        self.setup = setup
+        self.endpoint = endpoint
+        self.crowd = Crowd(0, 0.0)
+        self._rollout = rollout
+        self._lease_seconds = lease_seconds
+        self._crowds = 0
         self._supervisor = Supervisor(specs, folder / "logs", SystemClock())
+        self._hosts = Supervisor([], folder / "logs", SystemClock())
         self._supervisor.start()
 
     @property
     def pids(self) -> dict[str, int]:
         """Return the process ids by name."""
-        return self._supervisor.pids
+        return self._supervisor.pids | self._hosts.pids
+
+    def populate(self, crowd: Crowd) -> None:
+        """Put a crowd in the place of the one before, and wait until it is at work.
+
+        Raises:
+            RiposteError: a process died, or it took too long.
+        """
+        if self.crowd.actors:
+            self._hosts.stop()
+            time.sleep(LEASE_SECONDS + 2.0)  # its leases lapse
+        self._crowds += 1
+        self.crowd = crowd
+        self._hosts = Supervisor(self._specs(crowd), self.folder / "logs", SystemClock())
+        self._hosts.start()
+        self._until_busy()
+
+    def _specs(self, crowd: Crowd) -> list[ProcessSpec]:
+        """Return the processes that the synthetic actors share."""
+        specs: list[ProcessSpec] = []
+        for number in range(min(crowd.hosts, crowd.actors)):
+            share = crowd.actors // crowd.hosts + (number < crowd.actors % crowd.hosts)
+            name = f"host-{self._crowds}-{number}"
+            argv = (
+                sys.executable, "-P", "-m", "benchmarks.scaling.synthetic",
+                "--connect", self.endpoint, "--run-id", self.folder.name, "--name", name,
+                "--actors", f"{share}", "--rollout", f"{self._rollout}",
+                "--period", f"{crowd.period}", "--link-lease", f"{self._lease_seconds}",
+                "--out", f"{self.folder / name}.jsonl",
+            )  # fmt: skip
+            specs.append(ProcessSpec(name, argv, stop_seconds=0.5))
+        return specs
 
     def totals(self) -> list[Totals]:
         """Return the newest totals of each host that has any."""
         found: list[Totals] = []
-        for path in sorted(self.folder.glob("host-*.jsonl")):
+        for path in sorted(self.folder.glob(f"host-{self._crowds}-*.jsonl")):
             lines = path.read_bytes().splitlines(keepends=True)
             whole = [line for line in lines if line.endswith(b"\n")]
             if whole:
                 found.append(msgspec.json.decode(whole[-1], type=Totals))
         return found
 
-    def until_busy(self) -> None:
-        """Wait until every actor has a lease and the learner has made versions from rollouts.
-
-        Raises:
-            RiposteError: a process died, or it took too long.
-        """
-        end = time.monotonic() + START_SECONDS
+    def _until_busy(self) -> None:
+        """Wait until every actor has a lease and the learner makes versions from their rollouts."""
+        end, first = time.monotonic() + START_SECONDS, max(self.newest_checkpoint(), 0)
         while time.monotonic() < end:
             self.check()
             leased = sum(totals.leased for totals in self.totals())
-            if leased == self.crowd.actors and self.newest_checkpoint() >= 2:
+            if leased == self.crowd.actors and self.newest_checkpoint() >= first + 2:
                 return
             time.sleep(POLL_SECONDS)
         raise RiposteError(
@@ -123,7 +173,7 @@ class ScalingSite(RunReader):
         Raises:
             RiposteError: one of them died.
         """
-        for event in self._supervisor.poll():
+        for event in (*self._supervisor.poll(), *self._hosts.poll()):
             raise RiposteError(f"{event.describe}\n{event.tail}")
 
     def moment(self) -> Moment:
@@ -144,17 +194,20 @@ class ScalingSite(RunReader):
         while time.monotonic() < begin.at + seconds:
             self.check()
             time.sleep(POLL_SECONDS)
-        return used_between(begin, self.moment(), self.crowd) | {"resident": self.resident()}
+        return used_between(begin, self.moment(), self.setup, self.crowd) | {
+            "resident": self.resident()
+        }
 
     def stop(self) -> None:
         """End all processes."""
+        self._hosts.stop()
         self._supervisor.stop()
 
 
-def used_between(begin: Moment, end: Moment, crowd: Crowd) -> dict[str, Any]:
+def used_between(begin: Moment, end: Moment, setup: Setup, crowd: Crowd) -> dict[str, Any]:
     """Return what was done and used between two moments, per second of wall clock."""
     wall = end.at - begin.at
-    samples = crowd.num_envs * 40
+    samples = setup.rollout_samples
     rates: dict[str, float] = {}
     for name in ("accepted", "dropped", "put", "held_back", "bytes_out", "asks"):
         rates[name] = sum(
@@ -164,10 +217,11 @@ def used_between(begin: Moment, end: Moment, crowd: Crowd) -> dict[str, Any]:
     cpu = {name: (end.cpu[name] - begin.cpu[name]) / wall for name in end.cpu}
     thread = (end.learner_thread - begin.learner_thread) / wall
     return {
+        "site": setup.name,
         "actors": crowd.actors,
-        "batch_samples": crowd.batch_samples,
+        "batch_samples": setup.batch_samples,
         "rollout_samples": samples,
-        "updates": crowd.updates,
+        "updates": setup.updates,
         "wall_s": wall,
         "samples_per_s": rates["accepted"] * samples,
         "offered_per_s": crowd.rollouts_per_s * samples,
@@ -187,33 +241,32 @@ def used_between(begin: Moment, end: Moment, crowd: Crowd) -> dict[str, Any]:
 
 
 @contextlib.contextmanager
-def scaling_site(crowd: Crowd, rollout: Path) -> Iterator[ScalingSite]:
+def scaling_site(setup: Setup, rollout: Path, lease_seconds: float = 2.0) -> Iterator[ScalingSite]:
     """Run a site, in a folder of its own, until the block ends.
 
     Args:
-        crowd: its actors.
-        rollout: file of the recorded rollout that they send.
+        setup: what its learner is for.
+        rollout: file of the recorded rollout that its actors send.
+        lease_seconds: after which a silent link is given up.
     """
     folder = Path(tempfile.mkdtemp(prefix="riposte-scale-"))
-    samples = crowd.batch_samples
+    samples = setup.batch_samples
     settings = Settings.load(
         None,
         [
             *ENDLESS, *OVER_SOCKETS, f"learner.batch_samples={samples}",
-            f"learner.warm_up_samples={samples}", f"actor.num_envs={crowd.num_envs}",
+            f"learner.warm_up_samples={samples}", f"actor.num_envs={setup.num_envs}",
+            f"bus.lease_seconds={lease_seconds}",
         ],
     )  # fmt: skip
     (folder / "config.toml").write_text(settings.to_toml(), encoding="utf-8")
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     specs = [
-        spec
+        spec if setup.updates else _untaught(spec)
         for spec in processes(settings, folder, folder.name, endpoint)
         if not spec.name.startswith("actor-")
     ]
-    if not crowd.updates:
-        specs = [_untaught(spec) for spec in specs]
-    specs += _hosts(crowd, rollout, folder, endpoint)
-    site = ScalingSite(specs, folder, crowd)
+    site = ScalingSite(specs, folder, setup, endpoint, rollout, lease_seconds)
     try:
         yield site
     finally:
@@ -228,21 +281,3 @@ def _untaught(spec: ProcessSpec) -> ProcessSpec:
     at = spec.argv.index("-m") + 1
     argv = (*spec.argv[:at], "benchmarks.scaling.untaught", *spec.argv[at:])
     return dataclasses.replace(spec, argv=argv)
-
-
-def _hosts(crowd: Crowd, rollout: Path, folder: Path, endpoint: str) -> list[ProcessSpec]:
-    """Return the processes that the synthetic actors share."""
-    specs: list[ProcessSpec] = []
-    for number in range(crowd.hosts):
-        share = crowd.actors // crowd.hosts + (number < crowd.actors % crowd.hosts)
-        if not share:
-            continue
-        name = f"host-{number}"
-        argv = (
-            sys.executable, "-P", "-m", "benchmarks.scaling.synthetic", "--connect", endpoint,
-            "--run-id", folder.name, "--name", name, "--actors", f"{share}",
-            "--rollout", f"{rollout}", "--period", f"{crowd.period}",
-            "--out", f"{folder / name}.jsonl",
-        )  # fmt: skip
-        specs.append(ProcessSpec(name, argv, stop_seconds=0.5))
-    return specs

@@ -156,6 +156,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--actors", type=int, required=True)
     parser.add_argument("--rollout", type=Path, required=True, help="file of the recorded rollout")
     parser.add_argument("--period", type=float, required=True, help="seconds between two of one")
+    parser.add_argument("--link-lease", type=float, default=2.0, help="bus.lease_seconds")
     parser.add_argument("--out", type=Path, required=True, help="file of totals (JSON lines)")
     return parser.parse_args()
 
@@ -166,7 +167,10 @@ def main() -> None:
     set_process_name(found.name)
     rollout = recorded.read(found.rollout)
     clock = SystemClock()
-    cfg = BusConfig(connect=(found.connect,), open_seconds=60.0, shared_memory=False)
+    cfg = BusConfig(
+        connect=(found.connect,), open_seconds=60.0, shared_memory=False,
+        lease_seconds=found.link_lease,
+    )  # fmt: skip
     phases = np.random.default_rng(0).uniform(0.0, found.period, found.actors)
     with contextlib.ExitStack() as stack, found.out.open("ab", buffering=0) as out:
         actors: list[SyntheticActor] = []

@@ -1,8 +1,8 @@
 """A soak's verdict as text, and its block in ``docs/reliability.md``."""
 
 from pathlib import Path
-from typing import Any
 
+from benchmarks.soaking.samples import Kept
 from benchmarks.soaking.verdict import (
     COUNT_LIMIT,
     LATE_SHARE_LIMIT,
@@ -32,24 +32,24 @@ def text_of(verdict: Verdict) -> str:
     return "\n".join([*lines, f"    disk: {disk}"])
 
 
-def block_of(verdict: Verdict, machine: dict[str, Any], commit: str, command: str) -> str:
+def block_of(verdict: Verdict, kept: Kept) -> str:
     """Return the block of the page.
 
     Args:
         verdict: of the soak.
-        machine: as in a benchmark's report.
-        commit: of the source.
-        command: that repeats it.
+        kept: it was made from.
     """
-    quiet = "" if machine["quiet"] else ", busy with other work from the start"
+    started = kept.started
+    loads = sorted(one.load for one in kept.samples)
+    command = f"make soak SOAK_MINUTES={started.minutes:g}"
     disk = ", ".join(f"{job} {rate:.0f} MB/h" for job, rate in verdict.disk_mb_per_hour.items())
     rows = [
         f"| {one.name} | {one.value} | {one.limit} | {one.outcome} |" for one in verdict.criteria
     ]
     return "\n".join([
-        f"**{verdict.outcome}**: `{command}`, commit {commit}, {verdict.seconds / 60:.0f} minutes "
-        f"on {machine['cores']} cores of an {machine['name']} (load average "
-        f"{machine['load_before'][0]:.1f} before, {machine['load_after'][0]:.1f} after{quiet}): "
+        f"**{verdict.outcome}**: `{command}`, commit {started.commit}, "
+        f"{verdict.seconds / 60:.0f} minutes on {started.cores} cores of an {started.processor}, "
+        f"load average {loads[len(loads) // 2]:.1f} (median; the soak itself makes about 3): "
         f"{verdict.samples} samples, the first {verdict.warm_up:.0f} s left out as warm-up; "
         f"{verdict.rate:,.0f} training samples/s, {verdict.bouts} bouts. Disk: {disk}.",
         "",
@@ -62,7 +62,8 @@ def block_of(verdict: Verdict, machine: dict[str, Any], commit: str, command: st
         "one core and the training on the others. Slopes are straight lines through the means of "
         "20 equal blocks, with Student's 95 % interval. A criterion is *met* when the whole "
         "interval keeps its limit, *missed* when the whole interval breaks it, else *undecided*; "
-        "the soak is met when all are.",
+        "the soak is met when all are. A soak of less than half an hour only shows that it runs: "
+        "its slopes are undecided, whatever they are.",
         "",
         f"Limits: {MEMORY_LIMIT:g} MB an hour of memory in each process; {COUNT_LIMIT:g} file "
         f"handle and thread an hour; {LATENESS_LIMIT:g} ms an hour of the control's lateness (99th "

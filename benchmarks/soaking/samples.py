@@ -1,11 +1,22 @@
 """What a soak keeps, a line of JSON every few seconds: readable whenever it was killed."""
 
+import dataclasses
 from pathlib import Path
 
 import msgspec
 import psutil
 
 from shared.errors import ConfigError
+
+
+@dataclasses.dataclass(frozen=True)
+class Kept:
+    """A soak, as far as it went."""
+
+    started: "Started"
+    samples: list["Sample"]
+    ended: str
+    """Why it ended early; empty when it did not, or was killed."""
 
 
 class ProcessUse(msgspec.Struct, frozen=True, kw_only=True):
@@ -17,6 +28,16 @@ class ProcessUse(msgspec.Struct, frozen=True, kw_only=True):
     """Open file descriptors."""
     threads: int
     cpu_seconds: float
+
+
+class Started(msgspec.Struct, frozen=True, kw_only=True):
+    """The first line of a soak: where it runs."""
+
+    minutes: float
+    """That it is to last."""
+    cores: int
+    processor: str
+    commit: str
 
 
 class Sample(msgspec.Struct, frozen=True, kw_only=True):
@@ -41,6 +62,8 @@ class Sample(msgspec.Struct, frozen=True, kw_only=True):
     """Finished since the soak began."""
     disk_bytes: dict[str, int]
     """Of each job's folder."""
+    load: float
+    """Load average of the last minute."""
 
 
 class Ended(msgspec.Struct, frozen=True, kw_only=True):
@@ -78,8 +101,8 @@ def disk_use(folder: Path) -> int:
     return total
 
 
-def read(path: Path) -> tuple[list[Sample], str]:
-    """Return the samples of a soak, and why it ended early; a line cut short is left out.
+def read(path: Path) -> Kept:
+    """Return what a file holds; a last line cut short is left out.
 
     Raises:
         ConfigError: the file cannot be read, or a whole line in it is not of a soak.
@@ -88,16 +111,21 @@ def read(path: Path) -> tuple[list[Sample], str]:
         lines = path.read_bytes().splitlines(keepends=True)
     except OSError as error:
         raise ConfigError(f"cannot read {path}: {error.strerror}") from error
+    started: Started | None = None
     samples: list[Sample] = []
     ended = ""
     for number, line in enumerate(lines, 1):
         if not line.endswith(b"\n"):
             continue
         try:
-            if line.startswith(b'{"ended"'):
+            if number == 1:
+                started = msgspec.json.decode(line, type=Started)
+            elif line.startswith(b'{"ended"'):
                 ended = msgspec.json.decode(line, type=Ended).ended
             else:
                 samples.append(msgspec.json.decode(line, type=Sample))
         except msgspec.MsgspecError as error:
             raise ConfigError(f"{path}, line {number} is not of a soak: {error}") from error
-    return samples, ended
+    if started is None:
+        raise ConfigError(f"{path} is empty: the soak was killed before it began")
+    return Kept(started, samples, ended)

@@ -22,6 +22,10 @@ RATE_LIMIT = 0.05
 WARM_UP_SHARE, LEAST_WARM_UP, MOST_WARM_UP = 0.1, 30.0, 600.0
 """Of a soak are left out of all slopes: caches fill, allocators settle (share; s; s)."""
 
+LEAST_JUDGED = 1800.0
+"""A soak shorter than this (s) is too early for slopes: what grows and what only settles look the
+same, so they are undecided at best."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Criterion:
@@ -102,14 +106,17 @@ def judge(samples: Sequence[Sample], ended: str = "") -> Verdict:
         for name in names
         if (found := _of_process(kept, name, lambda use: use.rss_bytes / 1e6)) is not None
     )
-    criteria = [_ended(ended), _same_processes(kept)]
-    for name, found, _ in growth:
-        criteria.append(_grows(f"memory of {name}", found, MEMORY_LIMIT, "MB/h"))
-    for what, field in (("file handles", "files"), ("threads", "threads")):
-        criteria.append(_counts(kept, names, what, field))
-    criteria += _control(kept)
     rates = _rates(kept)
-    criteria.append(_rate(rates))
+    slopes = [
+        *(_grows(f"memory of {name}", found, MEMORY_LIMIT, "MB/h") for name, found, _ in growth),
+        _counts(kept, names, "file handles", "files"),
+        _counts(kept, names, "threads", "threads"),
+        _lateness(kept),
+        _rate(rates),
+    ]
+    if seconds < LEAST_JUDGED:
+        slopes = [dataclasses.replace(one, outcome="undecided") for one in slopes]
+    criteria = [_ended(ended), _same_processes(kept), *_late_ticks(kept), *slopes]
     return Verdict(
         criteria=tuple(criteria),
         seconds=seconds,
@@ -158,20 +165,26 @@ def _counts(kept: Sequence[Sample], names: Sequence[str], what: str, field: str)
     return _grows(f"{what}, {worst_name} (the worst)", hourly(worst), COUNT_LIMIT, "/h")
 
 
-def _control(kept: Sequence[Sample]) -> list[Criterion]:
+def _lateness(kept: Sequence[Sample]) -> Criterion:
     pairs = [(s.at, s.lateness_ms[1]) for s in kept if s.lateness_ms is not None]
     found = slope([at for at, _ in pairs], [late for _, late in pairs])
+    name = "lateness of the control, p99"
+    if found is None:
+        return Criterion(name, "not heard", f"at most {LATENESS_LIMIT:g} ms/h", "missed")
+    return _grows(name, hourly(found), LATENESS_LIMIT, "ms/h")
+
+
+def _late_ticks(kept: Sequence[Sample]) -> list[Criterion]:
     ticks = kept[-1].ticks - kept[0].ticks
     bad = kept[-1].ticks_late + kept[-1].ticks_lost - kept[0].ticks_late - kept[0].ticks_lost
-    if found is None or ticks <= 0:
-        return [Criterion("control ticks", "none was heard", "100 a second", "missed")]
+    if ticks <= 0:
+        return [Criterion("control ticks", "none", "100 a second", "missed")]
     share = bad / ticks
     return [
-        _grows("lateness of the control, p99", hourly(found), LATENESS_LIMIT, "ms/h"),
         Criterion(
             "control ticks over 10 ms late, or lost", f"{share:.2%} of {ticks:,}",
             f"at most {LATE_SHARE_LIMIT:.0%}", "met" if share <= LATE_SHARE_LIMIT else "missed",
-        ),
+        )
     ]  # fmt: skip
 
 

@@ -8,11 +8,12 @@ import pytest
 
 from benchmarks.slopes import slope
 from benchmarks.soaking import page
-from benchmarks.soaking.samples import Ended, ProcessUse, Sample, read
+from benchmarks.soaking.samples import Ended, Kept, ProcessUse, Sample, Started, read
 from benchmarks.soaking.verdict import judge, warm_up_of
 from shared.errors import ConfigError
 
 HOUR = 3600.0
+STARTED = Started(minutes=120, cores=2, processor="CPU", commit="abc")
 
 
 def test_a_straight_line_has_its_slope_and_no_width():
@@ -49,7 +50,7 @@ def sample(at: float, *, rss: float = 100e6, files: int = 30, late: float = 1.0,
     fields = {
         "at": at, "version": int(at), "batch_samples": 20480, "lateness_ms": (0.1, late, 20.0),
         "ticks": int(100 * at), "ticks_late": 0, "ticks_lost": 0, "bouts": int(at / 20),
-        "disk_bytes": {"train": int(1e4 * at), "play": 0},
+        "disk_bytes": {"train": int(1e4 * at), "play": 0}, "load": 3.0,
         "processes": {
             "train/league-0": ProcessUse(
                 pid=7, rss_bytes=int(rss), files=files, threads=4, cpu_seconds=at
@@ -99,11 +100,20 @@ def test_growth_beyond_its_limit_is_missed_and_nothing_else_is(changed, missed: 
     assert [name for name, outcome in found.items() if outcome != "met"] == [missed]
 
 
-def test_a_noisy_short_soak_is_undecided():
+def test_a_noisy_soak_is_undecided_where_the_noise_hides_the_limit():
     generator = np.random.default_rng(0)
-    noisy = [sample(at, rss=100e6 + 3e6 * generator.standard_normal()) for at in range(0, 300, 5)]
-    assert outcomes(noisy)["memory of train/league-0"] == "undecided"
+    noisy = [sample(at, rss=100e6 + 3e7 * generator.standard_normal()) for at in range(0, 7200, 5)]
+    found = outcomes(noisy)
+    assert found.pop("memory of train/league-0") == "undecided"
+    assert set(found.values()) == {"met"}
     assert judge(noisy).outcome == "undecided"
+
+
+def test_a_soak_too_short_for_slopes_judges_none_of_them():
+    growing = [sample(at, rss=100e6 + 1e6 * at, ticks_late=50 * at) for at in range(0, 300, 5)]
+    found = outcomes(growing)
+    assert found["memory of train/league-0"] == "undecided"
+    assert found["control ticks over 10 ms late, or lost"] == "missed"
 
 
 def test_a_soak_that_a_death_ended_is_missed():
@@ -113,18 +123,23 @@ def test_a_soak_that_a_death_ended_is_missed():
 
 def test_a_killed_soak_is_read_up_to_its_last_whole_line(tmp_path: Path):
     path = tmp_path / "soak.jsonl"
+    begin = msgspec.json.encode(STARTED) + b"\n"
     lines = [msgspec.json.encode(sample(at)) + b"\n" for at in range(0, 300, 5)]
-    path.write_bytes(b"".join(lines) + lines[0][:40])
-    samples, ended = read(path)
-    assert (len(samples), ended) == (60, "")
-    assert judge(samples).samples == 60
-    path.write_bytes(b"".join(lines) + msgspec.json.encode(Ended(ended="gone")) + b"\n")
-    assert read(path)[1] == "gone"
-    path.write_bytes(b"{}\n")
-    with pytest.raises(ConfigError, match="line 1"):
+    path.write_bytes(b"".join([begin, *lines, lines[0][:40]]))
+    kept = read(path)
+    assert (kept.started, len(kept.samples), kept.ended) == (STARTED, 60, "")
+    assert judge(kept.samples).samples == 60
+    path.write_bytes(b"".join([begin, *lines, msgspec.json.encode(Ended(ended="gone")) + b"\n"]))
+    assert read(path).ended == "gone"
+
+
+@pytest.mark.parametrize(("text", "reason"), [(b"{}\n", "line 1"), (b"", "empty"), (None, "read")])
+def test_what_is_no_soak_is_refused(text: bytes | None, reason: str, tmp_path: Path):
+    path = tmp_path / "soak.jsonl"
+    if text is not None:
+        path.write_bytes(text)
+    with pytest.raises(ConfigError, match=reason):
         read(path)
-    with pytest.raises(ConfigError, match="cannot read"):
-        read(tmp_path / "none")
 
 
 def test_too_few_samples_are_refused():
@@ -136,16 +151,10 @@ def test_too_few_samples_are_refused():
 
 
 def test_the_block_is_put_into_the_page_and_replaced_there(tmp_path: Path):
-    verdict = judge([sample(at) for at in range(0, 7200, 5)])
-    machine = {
-        "quiet": True,
-        "cores": 2,
-        "name": "CPU",
-        "load_before": (0, 0),
-        "load_after": (1, 1),
-    }
+    samples = [sample(at) for at in range(0, 7200, 5)]
+    verdict = judge(samples)
     path = tmp_path / "reliability.md"
-    page.write(path, page.block_of(verdict, machine, "abc", "make soak"))
+    page.write(path, page.block_of(verdict, Kept(STARTED, samples, "")))
     assert path.read_text().startswith("# Reliability\n\n## Soak\n\n<!-- soak:begin -->\n**met**")
     path.write_text("# R\n\nfaults\n\n## Soak\n\n" + path.read_text().partition("## Soak\n\n")[2])
     page.write(path, "again")
