@@ -28,6 +28,7 @@ JOBS = (
     Command("report", "jobs.report.command", "write a run's HTML report"),
     Command("bench", "jobs.bench", "measure against the limit, in one run"),
     Command("doctor", "jobs.doctor.command", "check this machine and say what to do"),
+    Command("chaos", "jobs.chaos.command", "what faults of every kind cost a running job"),
     Command("styles", "jobs.styles.command", "how protagonists move, and the three to send"),
     Command("identify", "jobs.identify.command", "what the simulation gets wrong, and why"),
     Command("export", "jobs.export", "a trained policy as ONNX, for other runtimes"),
@@ -45,8 +46,8 @@ SERVICES = (
     Command("referee", "referee.__main__", "scores a live bout"),
     Command("robot-io", "robot_io.__main__", "moves a robot, through the safety gate"),
     Command("page", "page.__main__", "a live bout in a browser, and its mouse"),
-)
     Command("metrics", "metrics.__main__", "what the processes say, for Prometheus"),
+)
 COMMANDS = {command.name: command for command in (*JOBS, *SERVICES)}
 
 EXTRAS = {

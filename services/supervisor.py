@@ -29,6 +29,8 @@ QUICK_DEATHS = 5
 """Quick deaths in a row after which it is given up."""
 QUICK_BUS_DEATHS = 20
 """The same for processes that only lost the bus: its router may be on its way back."""
+KILL_SECONDS = 10.0
+"""From SIGKILL until the others are stopped all the same: a starved machine takes its time."""
 TAIL_LINES = 12
 TAIL_BYTES = 4096
 OUTPUT_BYTES = 1 << 20
@@ -44,7 +46,10 @@ class ProcessSpec:
     name: str
     argv: tuple[str, ...]
     restart: bool = True
-    """Start it again when it dies; one that ends with 0 has finished and never is."""
+    """Start it again when it dies."""
+    finishes: bool = True
+    """Ending with 0 it has finished. A service never has: somebody told it to end who was not its
+    supervisor, and the others still need it."""
     stop_seconds: float = 20.0
     """From SIGTERM to SIGKILL."""
     cwd: Path | None = None
@@ -208,7 +213,7 @@ class Supervisor:
         assert child.popen is not None
         pid, child.popen = child.popen.pid, None
         _signal_group(pid, signal.SIGKILL)  # what it may have left behind
-        if code == 0:
+        if code == 0 and child.spec.finishes:
             return [self._event(child, "finished", pid, code)]
         lived = self._clock.now() - child.started_at
         child.quick_deaths = child.quick_deaths + 1 if lived < QUICK_SECONDS else 1
@@ -232,7 +237,7 @@ class Supervisor:
         except subprocess.TimeoutExpired:
             kind = "killed"
             popen.kill()
-            code = popen.wait(10.0)
+            code = _wait_for_end(popen)
         _signal_group(popen.pid, signal.SIGKILL)
         return [self._event(child, kind, popen.pid, code)]
 
@@ -241,6 +246,13 @@ class Supervisor:
     ) -> ProcessEvent:
         tail = "" if code is None else _tail(child.output, child.output_from)
         return ProcessEvent(kind, child.spec.name, pid, child.restarts, code, tail, delay)
+
+
+def _wait_for_end(popen: subprocess.Popen[bytes]) -> int:
+    """Return how a killed process ended; one that the kernel has not let go of yet will."""
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        return popen.wait(KILL_SECONDS)
+    return -signal.SIGKILL
 
 
 def _signal_group(pid: int, number: signal.Signals) -> None:

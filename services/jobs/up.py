@@ -82,7 +82,7 @@ def specs(
             agent=agent,
             overrides=overrides,
         )
-        made.append(ProcessSpec(name, command))
+        made.append(ProcessSpec(name, command, finishes=False))
     return made
 
 

@@ -125,3 +125,19 @@ def check_contents(rollout: Rollout, bout_steps: int) -> Ruling:
     if np.abs(expected - rollout.log_probs).max() > _LOG_PROB_TOLERANCE:
         return _drop("log probabilities are not those of the actions")
     return LEARN
+
+
+def check_new(stretches: set[tuple[int, int]], seen: set[tuple[int, int]]) -> Ruling:
+    """Return whether a rollout is of stretches of play that no other rollout was of.
+
+    Under a name of its own an old rollout would count again. Stretches are remembered while the
+    lease lives and this process does.
+
+    Args:
+        stretches: bout and first step of each of its worlds, its contents already checked.
+        seen: those of the rollouts that were held before under the same lease.
+    """
+    if known := stretches & seen:
+        bout, step = min(known)
+        return _drop(f"replayed: bout {bout} from step {step} on was handed over before")
+    return LEARN

@@ -9,7 +9,14 @@ from collections.abc import Sequence
 import structlog
 
 from services.learner.config import LearnerConfig
-from services.learner.gate import Decision, Ruling, check_contents, check_provenance, check_version
+from services.learner.gate import (
+    Decision,
+    Ruling,
+    check_contents,
+    check_new,
+    check_provenance,
+    check_version,
+)
 from shared.bus.base import Inbox, Request
 from shared.bus.delivery import Applied
 from shared.clock import Clock
@@ -72,6 +79,8 @@ class Intake:
         self._gathered: list[Held] = []
         self._committing: list[Held] = []
         self._first_refused_at: dict[str, float] = {}
+        self._seen: dict[str, set[tuple[int, int]]] = {}
+        """By lease, the bout and first step of every stretch that was held."""
 
     @property
     def in_turn(self) -> bool:
@@ -97,6 +106,7 @@ class Intake:
         """Take over what the league says; rollouts of a stage that is over are let go."""
         self.stage = schedule.stage
         self._leases = {lease.lease: lease for lease in schedule.leases}
+        self._seen = {name: seen for name, seen in self._seen.items() if name in self._leases}
         if not self.in_turn:
             self.release("the stage is over")
 
@@ -190,6 +200,7 @@ class Intake:
         ruling = self._rule(rollout, version)
         if ruling.decision is Decision.LEARN:
             self._first_refused_at.pop(rollout.lease, None)
+            self._seen.setdefault(rollout.lease, set()).update(_stretches(rollout))
             self._gathered.append((request, rollout))
         elif ruling.decision is Decision.LATER and not self._is_too_late(rollout.lease):
             request.refuse(ruling.reason, retry=True)
@@ -207,6 +218,8 @@ class Intake:
             ruling = check_version(rollout, version, self._oldest(version))
         if ruling.decision is Decision.LEARN:
             ruling = check_contents(rollout, self._rules.bout_steps)
+        if ruling.decision is Decision.LEARN:
+            ruling = check_new(_stretches(rollout), self._seen.get(rollout.lease, set()))
         return ruling
 
     def _oldest(self, version: int) -> int:
@@ -226,3 +239,8 @@ class Intake:
         self.counters["rollouts_dropped"] += 1
         log.info("rollout_dropped", name=request.message.name, reason=reason)
         request.reply(Receipt(accepted=False, reason=reason))
+
+
+def _stretches(rollout: Rollout) -> set[tuple[int, int]]:
+    """Return bout and first step of each world."""
+    return set(zip(rollout.bouts.tolist(), rollout.first_step.tolist(), strict=True))

@@ -1,32 +1,31 @@
 """Injects what is planned into one run of the job after another, until nothing is left."""
 
 import contextlib
+import os
 import secrets
+import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
 
 from services.jobs.chaos.books import Toll
 from services.jobs.chaos.faults import Blow, Chance, Fault
-from services.jobs.chaos.job import BATCH_SAMPLES, Job, JobEnded
+from services.jobs.chaos.job import Job, JobEnded
 from services.jobs.chaos.records import Injection, JobEnd, Records
 from services.jobs.chaos.timeline import WINDOW
 from shared.clock import Clock
-from shared.errors import RiposteError
 from shared.runtime.build import commit
 
 FULL_SECONDS = 90.0
 """Longest wait for the rate to be full again."""
-BEGIN_SECONDS = 120.0
-CALM_SECONDS = 3 * WINDOW
-"""Undisturbed at the start of a run, before the first fault."""
 PAUSE = (0.3, 2.0)
 """Random pause before a fault (s)."""
 MARGIN_SECONDS = 15.0
 """A fault needs so much more of the run than it lasts."""
-FINISH_SECONDS = 300.0
 
 Say = Callable[[str], None]
 
@@ -35,7 +34,7 @@ class Plan:
     """Which faults are still to be injected: in rounds, each round in an order of its own."""
 
     def __init__(
-        self, faults: Sequence[Fault[Job]], times: int, records: Records, seed: int
+        self, faults: Sequence[Fault[Any]], times: int, records: Records, seed: int
     ) -> None:
         """Plan what the records do not have yet."""
         generator = np.random.default_rng([seed, sum(records.counts.values())])
@@ -49,11 +48,11 @@ class Plan:
         """Return how many are left."""
         return len(self._left)
 
-    def put_back(self, fault: Fault[Job]) -> None:
+    def put_back(self, fault: Fault[Any]) -> None:
         """Plan it once more."""
         self._left.insert(0, fault)
 
-    def next(self, seconds: float) -> Fault[Job] | None:
+    def next(self, seconds: float) -> Fault[Any] | None:
         """Take the next that fits into a run that goes on for so long, None where none does."""
         for index, fault in enumerate(self._left):
             if fault.seconds + MARGIN_SECONDS <= seconds:
@@ -65,12 +64,13 @@ class Campaign:
     """Runs of the job and what is done to them."""
 
     def __init__(
-        self, make: Callable[[Path, int], Job], folder: Path, records: Records, plan: Plan,
-        clock: Clock, say: Say, *, seed: int, stop_seconds: float,
+        self, site: str, make: Callable[[Path, int], Job], folder: Path, records: Records,
+        plan: Plan, clock: Clock, say: Say, *, seed: int, stop_seconds: float, is_kept: bool,
     ) -> None:  # fmt: skip
         """Prepare.
 
         Args:
+            site: how the names of its runs begin.
             make: prepares the run in a folder, with a seed.
             folder: of the runs.
             records: where injections are kept.
@@ -79,7 +79,10 @@ class Campaign:
             say: tells a person how it goes.
             seed: of the moments and choices.
             stop_seconds: how long SIGSTOP lasts.
+            is_kept: leave the folders of runs that have ended.
         """
+        self._site = site
+        self._is_kept = is_kept
         self._make = make
         self._folder = folder
         self._records = records
@@ -93,15 +96,17 @@ class Campaign:
     def run(self, is_asked_to_stop: Callable[[], bool]) -> None:
         """Inject everything, unless somebody asks to stop; then the run can be taken up again."""
         while len(self._plan) and not is_asked_to_stop():
-            name = self._records.unfinished
+            name = self._records.unfinished(self._site)
             resume = bool(name) and (self._folder / name / "league.sqlite").exists()
             if not resume:
-                name = f"job-{len(self._records.jobs)}-{secrets.token_hex(3)}"
+                name = f"{self._site}-{len(self._records.jobs)}-{secrets.token_hex(3)}"
             job = self._make(self._folder / name, self._seed + len(self._records.jobs))
             try:
                 self._run(job, name, is_asked_to_stop, resume=resume)
             finally:
                 job.close()
+            if not self._is_kept and not is_asked_to_stop():
+                shutil.rmtree(job.folder)
 
     def _run(
         self, job: Job, name: str, is_asked_to_stop: Callable[[], bool], *, resume: bool
@@ -110,10 +115,10 @@ class Campaign:
         self._say(f"{name} begins")
         before = Toll()
         with contextlib.suppress(JobEnded):
-            self._settle(job)
+            job.settle()
             before = job.books.toll
             while not is_asked_to_stop():
-                fault = self._plan.next(seconds_left(job))
+                fault = self._plan.next(job.seconds_left)
                 if fault is None:
                     break
                 injection = self._inject(job, name, fault, before)
@@ -127,42 +132,31 @@ class Campaign:
             job.interrupt()
             return
         self._say(f"{name}: waiting for its end, {job.updates_left} updates")
-        code = job.finish(FINISH_SECONDS)
-        if code is None:
-            code = job.interrupt()
+        code = job.finish()
         end = JobEnd(
             job=name,
             seconds=self._clock.now() - job.began_at,
             exit_code=code,
-            finished=code == 0 and job.finished,
+            finished=job.finished,
             toll=job.books.toll,
             names=job.books.size,
+            unsafe=job.unsafe,
+            commands=job.commands,
             commit=commit(),
         )
         self._records.end(end)
         state = "finished" if end.finished else f"ENDED with exit code {code}"
         self._say(f"{name} {state}, {end.names} acknowledged names compared, {end.toll}")
 
-    def _settle(self, job: Job) -> None:
-        """Wait until the run learns, and for a stretch of it that nobody disturbs."""
-        began = job.until(
-            lambda: job.timeline.rate(job.clock.now() - WINDOW, job.clock.now()) > 0.0,
-            BEGIN_SECONDS,
-        )
-        if not began:
-            raise RiposteError(f"{job.folder} learned nothing within {BEGIN_SECONDS:g} s")
-        job.rest(1.0)
-        now = job.clock.now()
-        job.rest(CALM_SECONDS)
-        job.timeline.note_calm(now, job.clock.now())
-
-    def _inject(self, job: Job, name: str, fault: Fault[Job], before: Toll) -> Injection | None:
+    def _inject(self, job: Job, name: str, fault: Fault[Any], before: Toll) -> Injection | None:
         job.rest(float(self._chance.generator.uniform(*PAUSE)))
-        at, full = job.clock.now(), None
+        at, full, unsafe, stalled = job.clock.now(), None, job.unsafe, job.stalled
         blow = Blow("", at, at, None)
         try:
+            job.ready()
             blow = fault.strike(job, self._chance)
             full = self._wait_until_full(job, blow)
+            blow = job.after(blow)
         except JobEnded as error:
             job.poll()
             if job.finished:
@@ -171,7 +165,11 @@ class Campaign:
         if full is not None:
             job.timeline.note_calm(full, job.clock.now())
         job.poll()
-        return injection_of(job, name, fault, blow, full, job.books.toll.since(before))
+        injection = injection_of(job, name, fault, blow, full, job.books.toll.since(before))
+        return msgspec.structs.replace(
+            injection, unsafe=job.unsafe - unsafe, stalled=job.stalled - stalled,
+            load=os.getloadavg()[0] / len(os.sched_getaffinity(0)),
+        )  # fmt: skip
 
     def _wait_until_full(self, job: Job, blow: Blow) -> float | None:
         if blow.back_at is None:
@@ -180,15 +178,8 @@ class Campaign:
         return job.until(lambda: job.timeline.full_from(back, job.clock.now()), FULL_SECONDS)
 
 
-def seconds_left(job: Job) -> float:
-    """Return how long a run still goes on if nobody disturbs it (s)."""
-    if not (rate := job.timeline.base):
-        return 0.0
-    return job.updates_left * BATCH_SAMPLES / rate
-
-
 def injection_of(
-    job: Job, name: str, fault: Fault[Job], blow: Blow, full: float | None, toll: Toll
+    job: Job, name: str, fault: Fault[Any], blow: Blow, full: float | None, toll: Toll
 ) -> Injection:
     """Return the record of a fault."""
     lasted = blow.over_at - blow.struck_at
@@ -214,5 +205,7 @@ def line_of(injection: Injection, records: Records) -> str:
     full = "NOT back" if injection.full is None else f"full after {injection.full:.1f} s"
     harm = "" if injection.toll.is_none else f" HARM {injection.toll}"
     count = records.counts[injection.fault]
+    if injection.stalled:
+        full += f" (the machine stood still for {injection.stalled:.0f} s)"
     what = f"{injection.fault} {count}: {injection.victim or 'nobody'}"
     return f"  {what}, {full}{harm} {injection.note}".rstrip()

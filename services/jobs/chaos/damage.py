@@ -80,17 +80,28 @@ def fill(path: Path) -> None:
                 file.write(b"\0" * size)
 
 
-def mount_disk(folder: Path) -> str:
-    """Put a small disk under a folder; return why it cannot be, empty where it was."""
+def why_no_disk() -> str:
+    """Return why a small disk cannot be had; empty when it can."""
+    if shutil.which("mount") is None:
+        return "needs the program `mount`"
+    words = ("unshare", "--mount", "mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", "/mnt")
+    found = subprocess.run(words, capture_output=True, text=True)
+    return f"needs root's right to mount: {found.stderr.strip()}" if found.returncode else ""
+
+
+def mount_disk(folder: Path) -> None:
+    """Put a small disk under a folder.
+
+    Raises:
+        RiposteError: it is refused; ask ``why_no_disk`` first.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     if os.path.ismount(folder):
-        return ""
-    mount = shutil.which("mount")
-    if mount is None:
-        return "there is no program `mount`"
-    command = [mount, "-t", "tmpfs", "-o", f"size={DISK_MIB}m", "tmpfs", str(folder)]
+        return
+    command = ["mount", "-t", "tmpfs", "-o", f"size={DISK_MIB}m", "tmpfs", str(folder)]
     found = subprocess.run(command, capture_output=True, text=True)
-    return f"mounting a small disk is refused: {found.stderr.strip()}" if found.returncode else ""
+    if found.returncode:
+        raise RiposteError(f"no small disk can be mounted on {folder}: {found.stderr.strip()}")
 
 
 def unmount_disk(folder: Path) -> None:
@@ -106,6 +117,6 @@ FAULTS: tuple[Fault[Job], ...] = (
     ),
     Fault(
         "disk-full", "no byte free; freed when the run has ended, which is resumed", "league",
-        fill_disk, needs="disk", seconds=10.0,
+        fill_disk, seconds=10.0,
     ),
 )  # fmt: skip

@@ -51,7 +51,5 @@ class Fault(Generic[SITE]):
     strikes: str
     """Whom it can strike."""
     strike: Callable[[SITE, Chance], Blow]
-    needs: str = ""
-    """``disk``, ``clock`` or ``network``: what must have been prepared for the job."""
     seconds: float = 0.0
     """How long it goes on (s), to know whether a run is long enough."""

@@ -27,7 +27,7 @@ def _host(job: Job, chance: Chance, conduct: str, *, is_told: bool) -> Blow:
     name = f"actor-{conduct}-{seed:08x}"
     told, refused = job.books.told.copy(), job.books.refused.copy()
     acknowledged = len(job.books.acknowledged)
-    guest = job.host(guest_command(job, conduct, name, seed))
+    guest = job.let_in(guest_command(job, conduct, name, seed))
     is_up = job.until(lambda: name in job.up, UP_SECONDS)
     at = job.clock.now()
     try:

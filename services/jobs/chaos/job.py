@@ -14,18 +14,26 @@ from pathlib import Path
 from typing import TypeVar
 
 from services.jobs.chaos.books import Books
+from services.jobs.chaos.faults import Blow
 from services.jobs.chaos.tail import Tail
-from services.jobs.chaos.timeline import Timeline
+from services.jobs.chaos.timeline import WINDOW, Timeline
 from services.jobs.status import Endpoint, read_endpoint
 from services.league.events import RunFinished, StageEnded, StageStarted, VersionEntered
 from services.league.ledger import LedgerReader, open_read_only
 from shared.clock import Clock
-from shared.errors import LedgerError
+from shared.errors import LedgerError, RiposteError
 from shared.messages.league import Stage
 
 X = TypeVar("X")
 
 POLL_SECONDS = 0.05
+STALL_SECONDS = 2.0
+"""Between two looks, above which the machine stood still for whoever is not served first."""
+BEGIN_SECONDS = 300.0
+"""Longest wait for a run to begin, on a machine that is busy."""
+CALM_SECONDS = 3 * WINDOW
+"""Undisturbed at the start of a run, before the first fault."""
+FINISH_SECONDS = 600.0
 BATCH_SAMPLES = 1280
 STAGE_UPDATES = 300
 ITERATIONS = 2
@@ -51,6 +59,9 @@ class JobEnded(Exception):  # noqa: N818 - whether it is an error depends on who
 class Job:
     """One run of `riposte train`, which may be interrupted and taken up again."""
 
+    verb = "train"
+    """Of `riposte`; also the name of the log in which it says what it started."""
+
     def __init__(
         self,
         folder: Path,
@@ -60,6 +71,7 @@ class Job:
         stage_updates: int = STAGE_UPDATES,
         overrides: Sequence[str] = (),
         environment: Mapping[str, str] | None = None,
+        clocks: Path = Path(),
     ) -> None:
         """Prepare; ``start`` begins.
 
@@ -70,6 +82,7 @@ class Job:
             stage_updates: updates in each of its four stages.
             overrides: ``section.key=value``, over those of the small run.
             environment: variables of all its processes.
+            clocks: folder of their wall clocks.
         """
         self.folder = folder
         self.clock = clock
@@ -77,11 +90,19 @@ class Job:
         self.books = Books()
         self.stage: Stage | None = None
         self.finished = False
+        """Whether the ledger says that everything was done."""
+        self.stalled = 0.0
+        """How long the machine stood still (s)."""
+        self._looked_at = 0.0
+        self.unsafe = 0
+        """Commands to a robot outside the gate's rules; a training run has no robot."""
+        self.commands = 0
+        """Commands to a robot that were checked."""
         self.began_at = clock.now()
-        self.updates = 0
+        self._updates = 0
         self._stages_left = 2 * ITERATIONS
         self._stage_updates = stage_updates
-        self._overrides = (
+        self._overrides: tuple[str, ...] = (
             *SMALL,
             f"league.iterations={ITERATIONS}",
             f"league.antagonist_updates={stage_updates}",
@@ -89,12 +110,16 @@ class Job:
             f"train.seed={seed}",
             *overrides,
         )
+        self.clocks = clocks
+        """Where the wall clocks of its processes are, if they can be stepped."""
         self._environment = dict(environment or {})
         self._process: subprocess.Popen[bytes] | None = None
         self._guests: list[subprocess.Popen[bytes]] = []
         self._ledger: LedgerReader | None = None
         self._position = 0
-        self._log = Tail(folder / "logs" / "train.jsonl")
+        self._is_catching_up = False
+        """What is read first happened before this process watched."""
+        self._log = Tail(folder / "logs" / f"{self.verb}.jsonl")
         self._logs: dict[str, Tail] = {}
         self._pids: dict[str, int] = {}
         self.up: dict[str, int] = {}
@@ -106,15 +131,51 @@ class Job:
 
     def start(self, *, resume: bool = False) -> None:
         """Begin, or go on where the ledger ends."""
-        command = [sys.executable, "-P", "-m", "services.cli", "train", "--out", str(self.folder)]
+        command = [sys.executable, "-P", "-m", "services.cli", *self._words()]
         command += ["--resume"] if resume else []
-        command += [word for one in self._overrides for word in ("--set", one)]
+        self._is_catching_up = resume and not self._position
         self.folder.parent.mkdir(parents=True, exist_ok=True)
         with self.folder.with_suffix(".out").open("ab") as output:
             self._process = subprocess.Popen(
                 command, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
                 env={**os.environ, **self._environment}, process_group=0,
             )  # fmt: skip
+
+    def _words(self) -> list[str]:
+        """Return the command line behind `riposte`."""
+        settings = [word for one in self._overrides for word in ("--set", one)]
+        return [self.verb, "--out", str(self.folder), *settings]
+
+    def settle(self) -> None:
+        """Wait until it does what it is for, and for a stretch that nobody disturbs.
+
+        Raises:
+            JobEnded: the run is over.
+            RiposteError: it does not come to that.
+        """
+        if not self.until(self._is_going, BEGIN_SECONDS):
+            raise RiposteError(f"{self.folder}: nothing goes on there after {BEGIN_SECONDS:g} s")
+        self.rest(1.0)
+        now = self.clock.now()
+        self.rest(CALM_SECONDS)
+        self.timeline.note_calm(now, self.clock.now())
+
+    def ready(self) -> None:
+        """Wait until a fault can strike; a training run always can be struck."""
+
+    def after(self, blow: Blow) -> Blow:
+        """Put right what takes a person; a training run needs none."""
+        return blow
+
+    def _is_going(self) -> bool:
+        now = self.clock.now()
+        return self.timeline.rate(now - WINDOW, now) > 0.0
+
+    @property
+    def seconds_left(self) -> float:
+        """Return how long it goes on if nobody disturbs it (s)."""
+        rate = self.timeline.base
+        return self.updates_left * BATCH_SAMPLES / rate if rate else 0.0
 
     @property
     def exit_code(self) -> int | None:
@@ -129,7 +190,7 @@ class Job:
     @property
     def updates_left(self) -> int:
         """Return how many updates are still to be made, by the ledger."""
-        return max(self._stages_left * self._stage_updates - self.updates, 0)
+        return max(self._stages_left * self._stage_updates - self._updates, 0)
 
     def interrupt(self, seconds: float = 60.0) -> int:
         """Stop it as Ctrl-C does; return the exit code."""
@@ -138,7 +199,7 @@ class Job:
             self._process.send_signal(signal.SIGINT)
         return self._process.wait(seconds)
 
-    def host(self, command: Sequence[str]) -> "subprocess.Popen[bytes]":
+    def let_in(self, command: Sequence[str]) -> "subprocess.Popen[bytes]":
         """Start a process that joins the run from outside."""
         with self.folder.with_suffix(".out").open("ab") as output:
             guest = subprocess.Popen(
@@ -192,8 +253,8 @@ class Job:
         tail = self._logs.setdefault(path.stem, Tail(path))
         for event in tail.read():
             self.books.hear(event)
-            if event.get("event") == "service_started":
-                self.up[path.stem] = event["pid"]
+            if event.get("event") in ("service_started", "router_started"):
+                self.up[path.stem] = event.get("pid") or self._pids.get(path.stem, 0)
             if event.get("level") in ("warning", "error", "critical"):
                 self.events.setdefault(path.stem, []).append(str(event.get("event")))
 
@@ -211,18 +272,20 @@ class Job:
                 self.books.enter(entry.event, self.folder / "snapshots")
                 match entry.event:
                     case VersionEntered(metrics=metrics) if metrics is not None:
-                        self.timeline.add(now, metrics.samples)
-                        self.updates += 1
+                        if not self._is_catching_up:
+                            self.timeline.add(now, metrics.samples)
+                        self._updates += 1
                     case StageStarted(stage=stage):
                         self.stage = stage
-                        self.updates = 0
+                        self._updates = 0
                     case StageEnded():
                         self._stages_left -= 1
-                        self.updates = 0
+                        self._updates = 0
                     case RunFinished():
                         self.finished = True
                     case _:
                         pass
+            self._is_catching_up &= not entries
 
     def until(self, condition: Callable[[], X], seconds: float) -> X | None:
         """Return the condition's first true value, None where it does not come in time.
@@ -232,6 +295,7 @@ class Job:
         """
         deadline = self.clock.now() + seconds
         while True:
+            self._note_stall()
             self.poll()
             if value := condition():
                 return value
@@ -241,6 +305,14 @@ class Job:
                 return None
             self._rest()
 
+    def _note_stall(self) -> None:
+        """Count the time in which this process, which does next to nothing, got no processor."""
+        now = self.clock.now()
+        gap = now - self._looked_at - POLL_SECONDS
+        if self._looked_at and gap > STALL_SECONDS:
+            self.stalled += gap
+        self._looked_at = now
+
     def rest(self, seconds: float) -> None:
         """Watch for so long.
 
@@ -249,12 +321,13 @@ class Job:
         """
         self.until(lambda: False, seconds)
 
-    def finish(self, seconds: float) -> int | None:
-        """Wait for the end; return the exit code, None where the end does not come."""
+    def finish(self) -> int:
+        """Wait for the end, at most ``FINISH_SECONDS``; return the exit code."""
         with contextlib.suppress(JobEnded):
-            self.until(lambda: False, seconds)
+            self.until(lambda: False, FINISH_SECONDS)
         self.poll()
-        return self.exit_code
+        code = self.exit_code
+        return self.interrupt() if code is None else code
 
     def _rest(self) -> None:
         assert self._process is not None

@@ -13,8 +13,8 @@ from shared.messages.training import Rollout
 
 FORGED = 1 << 40
 """Added to the sequence number of what is made up, so that its name says so."""
-STEPS = 50_000
-"""Of a rollout that is over every limit: 16 MB and more."""
+STEPS = 10_000
+"""Of a rollout that is over the limit of 8 MiB with 8 bouts."""
 
 Lie = Callable[[Rollout], Rollout]
 

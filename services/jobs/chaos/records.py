@@ -43,6 +43,10 @@ class Injection(msgspec.Struct, frozen=True, kw_only=True):
     """Lies by kind."""
     refused: dict[str, int] = {}
     """Those that were refused."""
+    stalled: float = 0.0
+    """How long the whole machine stood still meanwhile (s): then its times say nothing."""
+    load: float = 0.0
+    """Load average of the machine, per core."""
     note: str = ""
 
 
@@ -93,12 +97,11 @@ class Records:
         """Return how often each fault was injected."""
         return Counter(injection.fault for injection in self.injections)
 
-    @property
-    def unfinished(self) -> str:
-        """Return the job that injections belong to and that has no end, empty where none is."""
+    def unfinished(self, site: str) -> str:
+        """Return the site's job that has injections and no end, empty where none is."""
         ended = {job.job for job in self.jobs}
-        open_jobs = [i.job for i in self.injections if i.job not in ended]
-        return open_jobs[-1] if open_jobs else ""
+        names = [i.job for i in self.injections if i.job.startswith(f"{site}-")]
+        return next((name for name in reversed(names) if name not in ended), "")
 
 
 def _read(path: Path, kind: type[S]) -> list[S]:

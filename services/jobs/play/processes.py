@@ -22,7 +22,7 @@ def processes(plan: Plan, endpoint: str) -> list[ProcessSpec]:
             connect=() if role == "router" else (endpoint,), agent=agent,
         )  # fmt: skip
         extra = ("--listen", endpoint) if role == "router" else ()
-        return ProcessSpec(name, (*command, *extra))
+        return ProcessSpec(name, (*command, *extra), finishes=False)
 
     made = [spec("router", "router-0")]
     if plan.play.record:

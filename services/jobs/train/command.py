@@ -125,7 +125,7 @@ def processes(settings: Settings, folder: Path, run: str, endpoint: str) -> list
             connect=() if role == "router" else (endpoint,), **more,
         )  # fmt: skip
         extra = ("--listen", endpoint) if role == "router" else ()
-        return ProcessSpec(name, (*command, *extra))
+        return ProcessSpec(name, (*command, *extra), finishes=False)
 
     made = [spec("router", "router-0"), spec("league", "league-0")]
     # The antagonist learns first: its long imports begin first.

@@ -83,6 +83,16 @@ def test_a_process_that_ends_well_is_finished_and_stays_so(supervise):
     assert supervisor.poll() == []
 
 
+def test_a_service_that_somebody_else_told_to_end_is_started_again(supervise):
+    supervisor = supervise(spec("a", FOREVER, finishes=False), spec("b", "pass", finishes=False))
+    supervisor.start()
+    died, restarted = poll_until(supervisor, "restarted")[:2]
+    assert (died.kind, died.name, died.exit_code) == ("died", "b", 0)
+    assert (restarted.kind, restarted.name) == ("restarted", "b")
+    assert [event.kind for event in supervisor.stop()][-1] == "stopped"
+    assert supervisor.poll() == []
+
+
 def test_delays_double_and_hopeless_processes_are_given_up_with_the_end_of_their_log(supervise):
     clock = ManualClock()
     supervisor = supervise(spec("a", "raise RuntimeError('no sword')"), clock=clock)

@@ -51,7 +51,7 @@ def rollout(
         opponent="scripted:static",
         model=MODEL,
         seed=11,
-        bouts=np.arange(worlds, dtype=np.int64),
+        bouts=np.arange(worlds, dtype=np.int64) + worlds * sequence,
         first_step=first,
         obs=obs,
         last_obs=generator.normal(0.3, 1.5, (worlds, OBS_DIM)).astype(np.float32),

@@ -420,6 +420,7 @@ def drop_reason(table: Table, **changes: Any) -> str:
         ({"truncated": np.ones(8, np.bool_)}, "truncated does not say"),
         ({"bouts": np.zeros(8, np.int64)}, "a bout stands in two worlds"),
         ({"stds": np.zeros(6, np.float32)}, "standard deviations"),
+        ({"bouts": rollout(1).bouts}, "replayed: bout"),  # another name, the same play
     ],
 )
 def test_a_bad_rollout_is_dropped_and_the_good_ones_are_learned_from(
