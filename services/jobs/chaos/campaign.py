@@ -118,6 +118,7 @@ class Campaign:
             job.settle()
             before = job.books.toll
             while not is_asked_to_stop():
+                job.ready()
                 fault = self._plan.next(job.seconds_left)
                 if fault is None:
                     break
@@ -153,7 +154,6 @@ class Campaign:
         at, full, unsafe, stalled = job.clock.now(), None, job.unsafe, job.stalled
         blow = Blow("", at, at, None)
         try:
-            job.ready()
             blow = fault.strike(job, self._chance)
             full = self._wait_until_full(job, blow)
             blow = job.after(blow)

@@ -15,14 +15,14 @@ import numpy as np
 
 from services.jobs.chaos.clock import step
 from services.jobs.chaos.faults import UP_SECONDS, Blow, Chance, Fault
-from services.jobs.chaos.job import FINISH_SECONDS, Job
+from services.jobs.chaos.job import FINISH_SECONDS, Job, JobEnded
 from services.jobs.chaos.rules import Rules
 from services.jobs.chaos.signals import kill, stop
 from services.jobs.who import operator
 from services.robot_io.config import SafetyConfig
 from shared.bus.base import Bus, Pending
 from shared.config.site import load_section
-from shared.errors import ConfigError, RiposteError
+from shared.errors import ConfigError
 from shared.messages.play import BatStates, GateReply, GateRequest, GateState, RefereeState
 from shared.messages.topics import ARM, BATS, GATE, REFEREE
 from shared.runtime.serve import ServeArgs, open_site_bus
@@ -43,6 +43,8 @@ STILL_AFTER = 1.5
 """What a robot may take to come to rest once it is shut (s)."""
 STILL_WITHIN = 0.01
 """How far its tool may lean meanwhile, for the other robot's bat may push it (m)."""
+FENCE_SECONDS = 180.0
+"""Longest wait for the robot to fence."""
 MOVES = 0.01
 """A robot whose tool went so far in ``SEEN`` states fences (m)."""
 SEEN = 30
@@ -137,11 +139,10 @@ class Match(Job):
         """Wait until it fences, arming where that takes a person.
 
         Raises:
-            JobEnded: the match is over.
-            RiposteError: it does not come to that.
+            JobEnded: the match is over, or does not come to that.
         """
-        if not self.until(self._is_going, UP_SECONDS):
-            raise RiposteError(f"the robot does not fence: {self._mode}, bout {self._phase}")
+        if not self.until(self._is_going, FENCE_SECONDS):
+            raise JobEnded(f"the robot does not fence: {self._mode}, bout {self._phase}")
 
     def _be_the_operator(self) -> None:
         """Reset and arm, one act at a time, as long as the robot is shut."""
@@ -170,7 +171,7 @@ class Match(Job):
         if self._mode in SHUT and moved > STILL_WITHIN:
             self.unsafe += 1
         now = self.clock.now()
-        self.ready()
+        self.until(self._is_going, FENCE_SECONDS)
         seconds = self.clock.now() - now
         return replace(
             blow, note=f"{blow.note} {mode}, moved {1e3 * moved:.1f} mm, armed and fencing again "
