@@ -33,6 +33,7 @@ from shared.bus.base import Bus
 from shared.clock import Clock, SystemClock
 from shared.errors import ConfigError
 from shared.messages.topics import PROGRESS
+from shared.policy.players import SCRIPTED_PLAYERS, SCRIPTED_PREFIX
 from shared.policy.snapshot import Fit
 from shared.runtime.build import commit
 from shared.runtime.files import RunLock, atomic_write, require_free_space
@@ -184,10 +185,11 @@ def _check_continued(found: argparse.Namespace, folder: Path, state: RunState) -
     planned = max(record.planned for record in state.evaluations.values())
     check_asked(state, [("--bouts", found.bouts, planned), ("--seed", found.seed, state.seed)])
     players = {ref for pair in state.evaluations for ref in pair}
-    if found.against == "scripted" and not any(ref.startswith("scripted:") for ref in players):
+    scripted = {SCRIPTED_PREFIX + name for name in SCRIPTED_PLAYERS}
+    if found.against == "scripted" and (absent := scripted - players):
         raise ConfigError(
-            "this tournament was begun without the scripted players; leave --against out to "
-            "continue it, or choose another folder with --out"
+            f"this tournament was begun without {min(absent)}; leave --against out to continue "
+            "it, or choose another folder with --out"
         )
     if missing := [ref for ref in found.players if ":" in ref and ref not in players]:
         raise ConfigError(

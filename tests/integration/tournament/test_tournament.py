@@ -72,4 +72,4 @@ def test_a_finished_tournament_is_not_played_again(finished: Path):
     assert "begun with --bouts 12, not 13" in one_line(done.stderr)
     done = riposte(["tournament", str(finished), "--against", "scripted"])
     assert done.returncode == 2
-    assert "begun without the scripted players" in one_line(done.stderr)
+    assert "begun without scripted:guard" in one_line(done.stderr)
