@@ -27,6 +27,8 @@ from shared.messages.league import Stage
 X = TypeVar("X")
 
 POLL_SECONDS = 0.05
+UNKNOWN = 0
+"""Process id of a router that says that it is up before it is known which it is."""
 STALL_SECONDS = 2.0
 """Between two looks, above which the machine stood still for whoever is not served first."""
 BEGIN_SECONDS = 300.0
@@ -241,6 +243,8 @@ class Job:
             if name is not None:
                 if event["event"] in ("process_started", "process_restarted"):
                     self._pids[name] = event["pid"]
+                    if self.up.get(name) == UNKNOWN:  # it was up before it was said to be started
+                        self.up[name] = event["pid"]
                 else:
                     self._pids.pop(name, None)
         logs = self.folder / "logs"
@@ -254,7 +258,7 @@ class Job:
         for event in tail.read():
             self.books.hear(event)
             if event.get("event") in ("service_started", "router_started"):
-                self.up[path.stem] = event.get("pid") or self._pids.get(path.stem, 0)
+                self.up[path.stem] = event.get("pid") or self._pids.get(path.stem, UNKNOWN)
             if event.get("level") in ("warning", "error", "critical"):
                 self.events.setdefault(path.stem, []).append(str(event.get("event")))
 
