@@ -59,7 +59,7 @@ def read_endpoint(folder: Path) -> Endpoint:
             f"no run in {folder}: {path.name} is missing (riposte train writes it); "
             "name the run with --run DIR, or its bus with --connect tcp/HOST:PORT"
         ) from error
-    except msgspec.MsgspecError as error:
+    except (ValueError, RecursionError) as error:
         raise ConfigError(f"{path} is damaged: {error}") from error
 
 

@@ -5,7 +5,6 @@ What a user can get wrong is answered in one line with the file, the line and th
 
 import difflib
 import re
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -13,6 +12,7 @@ from typing import Any, TypeVar, cast
 import msgspec
 import tomli_w
 
+from shared.config import toml
 from shared.config.location import line_of
 from shared.errors import ConfigError
 
@@ -107,8 +107,8 @@ def _read(path: Path | None) -> str:
 
 def _parse(path: Path | None, text: str) -> Table:
     try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        return toml.parse(text)
+    except ValueError as error:
         raise ConfigError(f"{path}: not TOML: {error}") from error
 
 
@@ -134,8 +134,8 @@ def _override(text: str) -> tuple[list[str], Any, str]:
 
 def _toml_value(text: str, value: str) -> Any:  # TOML values are of any type
     try:
-        tables = tomllib.loads(f"value = {value}")
-    except tomllib.TOMLDecodeError as error:
+        tables = toml.parse(f"value = {value}")
+    except ValueError as error:
         if _BARE_WORD.match(value):
             return value
         raise ConfigError(
