@@ -42,6 +42,11 @@ class LearningPolicies:
         """Return the newest policy of an agent, None before the first."""
         return self._newest.get(agent)
 
+    @property
+    def versions(self) -> dict[str, int]:
+        """Return the newest version of each agent."""
+        return {agent: learning.version for agent, learning in self._newest.items()}
+
     def tick(self) -> bool:
         """Take what was announced; return whether there was anything."""
         did = False

@@ -387,6 +387,7 @@ class Actor:
             rates={"steps_per_s": self._samples.per_second()},
             counters={**self._counters, "opponents_cached": len(self._opponents)},
             last_error=self._last_error or self._policies.last_error,
+            policies=self._policies.versions,
         )
 
     def close(self) -> None:

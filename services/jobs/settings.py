@@ -25,7 +25,7 @@ class TrainConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     seed: int = 0
     """Of everything random in the run."""
     actors: int = 1
-    """Actor processes; one per spare core."""
+    """Actor processes on this machine, one per spare core; 0 where all join from others."""
     record: bool = True
     """Run a recorder: the live view and recording.rrd."""
     tournament_bouts: int = 100
@@ -35,8 +35,8 @@ class TrainConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         """Check the ranges."""
         if not 0 <= self.seed < 2**31:
             raise ValueError(f"seed ({self.seed}) must be in 0 .. {2**31 - 1}")
-        if not 1 <= self.actors <= 256:
-            raise ValueError(f"actors ({self.actors}) must be in 1 .. 256")
+        if not 0 <= self.actors <= 256:
+            raise ValueError(f"actors ({self.actors}) must be in 0 .. 256")
         if not 1 <= self.tournament_bouts <= 100_000:
             raise ValueError(f"tournament_bouts ({self.tournament_bouts}) must be in 1 .. 100000")
 

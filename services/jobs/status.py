@@ -1,6 +1,8 @@
-"""`riposte status`: who runs, what they do, who waits for whom and how long."""
+"""`riposte status`: every process on every machine, who waits for whom, who has fallen silent."""
 
 import argparse
+import contextlib
+import dataclasses
 import json
 import os
 from collections.abc import Sequence
@@ -9,21 +11,31 @@ from typing import Any
 
 import msgspec
 from rich.console import Console
-from rich.table import Table
+from rich.live import Live
 
-from shared.bus.base import Bus
+from services.jobs.roll_call import RollCall
+from services.jobs.status_view import Snapshot, render
+from shared.bus.config import BusConfig
+from shared.bus.zenoh import hear_runs
 from shared.clock import Clock, SystemClock
 from shared.errors import ConfigError
-from shared.messages.live import Progress, ServiceStatus
-from shared.messages.topics import PROGRESS, STATUS
+from shared.messages.topics import STATUS
 from shared.runtime.files import atomic_write
-from shared.runtime.serve import ServeArgs, certificates_override, open_site_bus, run_id_of
+from shared.runtime.serve import (
+    ServeArgs,
+    certificates_override,
+    open_site_bus,
+    run_id_of,
+    stop_on_signals,
+)
 
-LISTEN_SECONDS = 1.5
-"""Every process reports once a second."""
+LISTEN_SECONDS = 2.3
+"""Every process reports once a second; two reports tell its load."""
+WATCH_SECONDS = 1.0
+LATEST = Path("runs/latest")
 OPEN_SECONDS = 3.0
 """A person waits for the answer."""
-PIPE_WIDTH = 160
+PIPE_WIDTH = 190
 """Columns of the table where nobody's terminal sets them."""
 EXIT_NOBODY = 1
 
@@ -36,13 +48,6 @@ class Endpoint(msgspec.Struct, frozen=True, kw_only=True):
     """Name of the run on the bus."""
     certificates: str = ""
     """Folder of the site's certificates; empty where it has none."""
-
-
-class Snapshot(msgspec.Struct, frozen=True, kw_only=True):
-    """What was heard."""
-
-    services: tuple[ServiceStatus, ...]
-    progress: Progress | None = None
 
 
 def read_endpoint(folder: Path) -> Endpoint:
@@ -99,94 +104,20 @@ def bus_args(found: argparse.Namespace, role: str) -> ServeArgs:
     )
 
 
-def listen(bus: Bus, clock: Clock, seconds: float = LISTEN_SECONDS) -> Snapshot:
-    """Return what the services of the run say within ``seconds``."""
-    statuses, progress = bus.subscribe(STATUS), bus.subscribe(PROGRESS)
-    heard: dict[tuple[str, str], ServiceStatus] = {}
-    newest: Progress | None = None
-    until = clock.now() + seconds
-    while (left := until - clock.now()) > 0:
-        bus.wait(left)
-        while (status := statuses.take()) is not None:
-            heard[status.role, status.name] = status
-        while (said := progress.take()) is not None:
-            newest = said
-    statuses.close()
-    progress.close()
-    return Snapshot(services=tuple(heard[key] for key in sorted(heard)), progress=newest)
-
-
 def to_json(snapshot: Snapshot) -> dict[str, Any]:
-    """Return the snapshot in builtins."""
-    return msgspec.to_builtins(snapshot)
-
-
-def headline(progress: Progress) -> str:
-    """Return where the run stands, in one line."""
-    parts = [f"{progress.run}: phase {progress.phase}"]
-    if progress.iteration:
-        parts.append(f"iteration {progress.iteration}")
-    if progress.agent:
-        parts += [
-            f"stage {progress.stage + 1}/{progress.stages}",
-            f"{progress.agent} learns",
-            f"update {progress.update}/{progress.max_updates}",
-        ]
-    if progress.evaluations_total:
-        parts.append(f"evaluations {progress.evaluations_done}/{progress.evaluations_total}")
-    if progress.score_bouts:
-        low, high = progress.score_low, progress.score_high
-        parts.append(f"score {progress.score_mean:.0f} [{low:.0f}, {high:.0f}]")
-    if progress.samples_per_s:
-        parts.append(f"{progress.samples_per_s:.0f} samples/s")
-        parts.append(f"policy lag {progress.policy_lag_mean:.2f}")
-    if progress.dropped_rollouts:
-        parts.append(f"dropped rollouts {progress.dropped_rollouts}")
-    if progress.eta_seconds >= 0:
-        minutes, rest = divmod(round(progress.eta_seconds), 60)
-        parts.append(f"{minutes}:{rest:02d} left")
-    return ", ".join(parts)
-
-
-def table(snapshot: Snapshot) -> Table:
-    """Return one row for each service."""
-    made = Table(box=None, pad_edge=False, header_style="bold")
-    made.add_column("service", no_wrap=True)
-    made.add_column("state")
-    made.add_column("waits for")
-    made.add_column("rates", no_wrap=True)
-    made.add_column("dropped", no_wrap=True)
-    made.add_column("cpu", justify="right", no_wrap=True)
-    made.add_column("memory", justify="right", no_wrap=True)
-    made.add_column("last error", style="red")
-    for status in snapshot.services:
-        made.add_row(
-            status.name,
-            status.state,
-            waits(status),
-            "\n".join(f"{name} {value:,.0f}" for name, value in sorted(status.rates.items())),
-            "\n".join(f"{name} {count}" for name, count in drops(status).items()),
-            f"{status.cpu_seconds:.0f} s",
-            f"{status.rss_bytes / 2**20:.0f} MiB",
-            status.last_error,
-        )
-    return made
-
-
-def waits(status: ServiceStatus) -> str:
-    """Return whom a service waits for and since when."""
-    if not status.waiting_for:
-        return ""
-    return f"{status.waiting_for} for {status.waiting_seconds:.1f} s"
-
-
-def drops(status: ServiceStatus) -> dict[str, int]:
-    """Return the counters that say something was lost or refused, those above zero."""
-    words = ("drop", "refus", "lost", "reconnect")
+    """Return the snapshot in builtins: what every process said, and what was made of it."""
     return {
-        name: count
-        for name, count in sorted(status.counters.items())
-        if count > 0 and any(word in name for word in words)
+        "services": [
+            {
+                **msgspec.to_builtins(heard.status),
+                "silent_seconds": heard.silent_seconds,
+                "cpu_percent": heard.cpu_percent,
+                "policy_lags": heard.lags,
+            }
+            for heard in snapshot.processes
+        ],
+        "missing": msgspec.to_builtins(snapshot.missing),
+        "progress": msgspec.to_builtins(snapshot.progress),
     }
 
 
@@ -194,32 +125,72 @@ def main(argv: Sequence[str]) -> int:
     """Run ``riposte status``; return 1 when nobody is there."""
     parser = argparse.ArgumentParser(prog="riposte status", description=__doc__)
     add_bus_arguments(parser)
-    parser.add_argument("--json", action="store_true", help="one JSON object")
+    how = parser.add_mutually_exclusive_group()
+    how.add_argument("--json", action="store_true", help="one JSON object, with everything")
+    how.add_argument("--watch", action="store_true", help="go on, every second, until Ctrl-C")
     found = parser.parse_args(argv)
     clock = SystemClock()
     args = bus_args(found, "status")
-    bus = open_site_bus(args, clock)
-    try:
-        snapshot = listen(bus, clock)
-    finally:
-        bus.close()
+    if not found.run_id and (found.connect or found.site) and found.run == LATEST:
+        args = dataclasses.replace(args, run_id=_only_run(args, clock))
+    with (
+        contextlib.closing(open_site_bus(args, clock)) as bus,
+        contextlib.closing(RollCall(bus, clock)) as call,
+    ):
+        if found.watch:
+            return _watch(call)
+        call.listen(LISTEN_SECONDS)
+        snapshot = call.snapshot()
     if found.json:
         print(json.dumps(to_json(snapshot)))
     elif snapshot.services:
-        if snapshot.progress is not None:
-            print(headline(snapshot.progress))
-        console = Console()
-        if not console.is_terminal:
-            console.width = PIPE_WIDTH
-        console.print(table(snapshot))
+        _console().print(render(snapshot))
     else:
         print(f"nobody answers at {', '.join(args.connect) or args.site} for run {args.run_id!r}")
     return 0 if snapshot.services else EXIT_NOBODY
 
 
+def _watch(call: RollCall) -> int:
+    """Show who runs until a signal."""
+    console = _console()
+    with (
+        stop_on_signals() as stop,
+        Live(console=console, auto_refresh=False, vertical_overflow="visible") as live,
+    ):
+        while not stop.is_set():
+            call.listen(WATCH_SECONDS)
+            live.update(render(call.snapshot()), refresh=console.is_terminal)
+            if not console.is_terminal:
+                console.print(render(call.snapshot()))
+    return 0
+
+
+def _console() -> Console:
+    console = Console()
+    if not console.is_terminal:
+        console.width = PIPE_WIDTH
+    return console
+
+
+def _only_run(args: ServeArgs, clock: Clock) -> str:
+    """Return the run that is on at a bus that was named without one.
+
+    Raises:
+        ConfigError: several are.
+    """
+    cfg = args.section("bus", BusConfig).with_endpoints(connect=args.connect)
+    runs = sorted(hear_runs(cfg, args.name, clock, "operator", STATUS, LISTEN_SECONDS))
+    if len(runs) > 1:
+        raise ConfigError(
+            f"{len(runs)} runs are on at {', '.join(cfg.routers)}: {', '.join(runs)}; "
+            f"choose one, as in --run-id {runs[0]}"
+        )
+    return runs[0] if runs else args.run_id
+
+
 def add_bus_arguments(
     parser: argparse.ArgumentParser,
-    run: Path | None = Path("runs/latest"),
+    run: Path | None = LATEST,
     about: str = "%(default)s",
 ) -> None:
     """Add what an onlooker needs to find a run: see ``bus_args``.

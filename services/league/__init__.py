@@ -1,6 +1,6 @@
 """The league: who learns against whom, the ledger of everything that happened, the snapshot store.
 
 Reads nothing by itself. Answers ``league/lease``, ``league/renewal``, ``league/results``,
-``league/version``, ``league/incident`` and ``league/snapshot``; writes ``league/schedule`` and
-``league/progress``.
+``league/version``, ``league/incident``, ``league/snapshot`` and ``league/settings``; writes
+``league/schedule`` and ``league/progress``.
 """

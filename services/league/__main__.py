@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from services.league.config import LeagueConfig
 from services.league.service import League
+from services.league.settings import run_settings
 from shared.bus.base import Bus
 from shared.clock import Clock
 from shared.game.rules import RuleBook
@@ -15,7 +16,10 @@ def build(args: ServeArgs, bus: Bus, clock: Clock) -> League:
     """Return the league of the run in ``args.run``."""
     cfg = args.section("league", LeagueConfig)
     rules = args.section("game", RuleBook)
-    return League(cfg, bus, clock, args.run, args.run_id, cfg.seed, False, rules=rules)
+    settings = run_settings(args.site, args.overrides)
+    return League(
+        cfg, bus, clock, args.run, args.run_id, cfg.seed, False, rules=rules, settings=settings
+    )
 
 
 def main(argv: Sequence[str] | None = None) -> int:

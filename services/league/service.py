@@ -25,7 +25,9 @@ from shared.messages.league import (
     LeaseRenewal,
     LeaseRequest,
     LeaseStatus,
+    RunSettings,
     Schedule,
+    SettingsRequest,
     SnapshotReply,
     SnapshotRequest,
 )
@@ -37,6 +39,7 @@ from shared.messages.topics import (
     RENEWAL,
     RESULTS,
     SCHEDULE,
+    SETTINGS,
     SNAPSHOT,
     VERSION,
 )
@@ -63,7 +66,7 @@ class League:
 
     def __init__(
         self, cfg: LeagueConfig, bus: Bus, clock: Clock, directory: Path, run: str, seed: int,
-        serial: bool, *, rules: RuleBook | None = None,
+        serial: bool, *, rules: RuleBook | None = None, settings: RunSettings | None = None,
     ) -> None:  # fmt: skip
         """Open the run in ``directory``, or start one there.
 
@@ -76,6 +79,7 @@ class League:
             seed: of the run.
             serial: whether everything ticks in one process, with a fixed policy lag.
             rules: the rule book results are checked against.
+            settings: what actors that join from elsewhere are told; None: all defaults.
 
         Raises:
             LedgerError: the ledger is in use, damaged, of another run, or cannot be written.
@@ -99,6 +103,8 @@ class League:
         self._renewals: Inbox[LeaseRenewal, LeaseStatus] = bus.answer(RENEWAL)
         self._requests: Inbox[LeaseRequest, Lease] = bus.answer(LEASE)
         self._snapshots: Inbox[SnapshotRequest, SnapshotReply] = bus.answer(SNAPSHOT)
+        self._settings = settings or RunSettings(toml="")
+        self._settings_asked: Inbox[SettingsRequest, RunSettings] = bus.answer(SETTINGS)
 
     @property
     def state(self) -> RunState:
@@ -160,11 +166,12 @@ class League:
             waiting_seconds=self._clock.now() - self._desk.moved_at if waiting_for else 0.0,
             counters=counters | dict(self._desk.counters),
             last_error=failure or self._desk.last_error,
+            policies=self._newest_versions(),
         )
 
     def close(self) -> None:
         """Stop answering and close the ledger; everything acknowledged is in it."""
-        for inbox in (*self._writing_inboxes(), self._snapshots):
+        for inbox in (*self._writing_inboxes(), self._snapshots, self._settings_asked):
             inbox.close()
         self._journal.close()
 
@@ -201,6 +208,9 @@ class League:
     def _answer_snapshots(self) -> bool:
         """Answer from the store; needs no ledger, so it works while that cannot be written."""
         did = False
+        for asked in _take(self._settings_asked):
+            did = True
+            asked.reply(self._settings)
         for request in _take(self._snapshots):
             did = True
             try:
@@ -244,11 +254,13 @@ class League:
         return Schedule(
             stage=record.stage if record is not None else None,
             leases=leases.summaries(state, self._cfg, self._journal.at_ns),
-            versions={
-                agent: state.latest_version(agent) for agent in AGENTS if state.versions[agent]
-            },
+            versions=self._newest_versions(),
             finished=state.finished,
         )
+
+    def _newest_versions(self) -> dict[str, int]:
+        state = self.state
+        return {agent: state.latest_version(agent) for agent in AGENTS if state.versions[agent]}
 
 
 def _take(inbox: Inbox[Any, Any]) -> list[Request[Any, Any]]:

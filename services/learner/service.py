@@ -389,6 +389,7 @@ class Learner:
             rates=rates,
             counters=self._intake.counters | counts,
             last_error=self._last_error,
+            policies={self._agent: self.version},
         )
 
     def close(self) -> None:

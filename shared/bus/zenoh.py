@@ -50,6 +50,8 @@ Declare: TypeAlias = Callable[[zenoh.Session], Any]
 PREFIX = "riposte/v1"
 UPKEEP_SECONDS = 0.25
 CLOSE_SECONDS = 3.0
+MOST_RUNS = 64
+"""Of one bus that are told apart."""
 """Longest wait for a session to close; a thread that hangs in it is left behind."""
 
 log = structlog.get_logger()
@@ -141,6 +143,19 @@ def open_router(cfg: BusConfig) -> Router:
                 "or give another endpoint with --listen"
             ) from error
         raise ConfigError(f"cannot listen on {where}: {text.split(' at /')[0]}") from error
+
+
+def hear_runs(
+    cfg: BusConfig, name: str, clock: Clock, role: Role, topic: Topic[Any], seconds: float
+) -> frozenset[str]:
+    """Return the names of the runs that say something of a topic within so many seconds.
+
+    Raises:
+        BusError: no router answered.
+        ConfigError: as ``open_zenoh``.
+    """
+    with contextlib.closing(open_zenoh(cfg, name, clock, "any", role)) as bus:
+        return bus.runs(topic, seconds)
 
 
 class ZenohBus:
@@ -270,6 +285,22 @@ class ZenohBus:
             )
         return present.names()
 
+    def runs(self, topic: Topic[Any], seconds: float) -> frozenset[str]:
+        """Return the runs on this bus, its own or not, that say something of a topic meanwhile.
+
+        Raises:
+            BusError: as ``wait``.
+        """
+        names: set[str] = set()
+        pattern = f"{PREFIX}/*/{pattern_of(topic.key, {})}"
+        callback = self._guard(lambda it: _note_run(names, str(it.key_expr)))
+        self._declare(names_owner := object(), lambda it: it.declare_subscriber(pattern, callback))
+        until = self._clock.now() + seconds
+        while (left := until - self._clock.now()) > 0:
+            self.wait(left)
+        self._undeclare(names_owner)
+        return frozenset(names)
+
     def wait(self, timeout: float) -> bool:
         """Wait until something new arrives, at most ``timeout`` seconds; do the upkeep.
 
@@ -375,6 +406,11 @@ class _Path:
 def _note_token(present: Present, token: zenoh.Sample) -> None:
     key = str(token.key_expr)
     present.on_token(key, key.split("/")[-2], token.kind == zenoh.SampleKind.PUT)
+
+
+def _note_run(names: set[str], key: str) -> None:
+    if len(names) < MOST_RUNS:
+        names.add(key.removeprefix(f"{PREFIX}/").partition("/")[0])
 
 
 def _open(config: str) -> zenoh.Session:

@@ -76,6 +76,27 @@ def load_site(
     return {name: load_section(path, name, type, overrides) for name, type in types.items()}
 
 
+def raw_sections(
+    path: Path | None, sections: Sequence[str], overrides: Sequence[str] = ()
+) -> dict[str, Table]:
+    """Return sections as they are written, with the overrides put in, for somebody else to check.
+
+    Args:
+        path: the site file; None means none.
+        sections: their names; those that are nowhere are left out.
+        overrides: as in ``load_section``.
+
+    Raises:
+        ConfigError: the file cannot be read or has an unknown section.
+    """
+    text = _read(path)
+    tables = _parse(path, text)
+    _check_names(path, text, tables)
+    for keys, value, _ in map(_override, overrides):
+        _put(tables, keys, value)
+    return {name: tables[name] for name in sections if name in tables}
+
+
 def dump(sections: Mapping[str, msgspec.Struct]) -> str:
     """Return the TOML text of resolved sections; ``load_section`` reads the same values back.
 

@@ -165,6 +165,22 @@ class SnapshotReply(Message, frozen=True, kw_only=True):
     reason: str = ""
 
 
+class SettingsRequest(Message, frozen=True, kw_only=True):
+    """An actor that has joined from elsewhere asks what it must play by."""
+
+    actor: str
+
+
+class RunSettings(Message, frozen=True, kw_only=True):
+    """What every actor of a run must have the same of, wherever it runs."""
+
+    toml: str
+    """Sections of the run's site file: ``[sim]``, ``[game]``, ``[action]``, ``[reward]`` and
+    ``[actor]``."""
+    model: str = ""
+    """Text of the model file, where ``[sim]`` names a file; empty for a shipped model."""
+
+
 class Incident(Message, frozen=True, kw_only=True):
     """Something a report should mention: a process restarted, a rollout refused."""
 

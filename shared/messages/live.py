@@ -13,6 +13,7 @@ class ServiceStatus(Message, frozen=True, kw_only=True):
     boot: str
     pid: int
     host: str
+    """Name of the machine."""
     state: str
     """What it does now, in a few words."""
     waiting_for: str = ""
@@ -27,6 +28,10 @@ class ServiceStatus(Message, frozen=True, kw_only=True):
     last_error: str = ""
     version: str = ""
     """Of Riposte."""
+    commit: str = ""
+    """Of the source it runs, ``+`` after it when files differ; empty outside a checkout."""
+    policies: dict[str, int] = {}
+    """By agent, the newest policy version that it has."""
 
 
 class Progress(Message, frozen=True, kw_only=True):

@@ -11,7 +11,9 @@ from shared.messages.league import (
     LeaseRenewal,
     LeaseRequest,
     LeaseStatus,
+    RunSettings,
     Schedule,
+    SettingsRequest,
     SnapshotReply,
     SnapshotRequest,
 )
@@ -130,6 +132,10 @@ SNAPSHOT = Service(
     "league/snapshot", SnapshotRequest, SnapshotReply, 4 * KIB, 8 * MIB, ("actor",), "league",
     "fetches an immutable policy by its hash",
 )
+SETTINGS = Service(
+    "league/settings", SettingsRequest, RunSettings, 4 * KIB, 1 * MIB, ("actor",), "league",
+    "what an actor that joins from elsewhere must play by",
+)
 POLICY = Topic(
     "learner/{agent}/policy", PolicyAnnouncement, Qos.LATEST, 8 * MIB, ("learner",), ("actor",),
     "the version to act with",
@@ -209,6 +215,7 @@ SERVICES: tuple[Service[Any, Any], ...] = (
     LEASE,
     RENEWAL,
     SNAPSHOT,
+    SETTINGS,
     BOUT,
     PLAYER,
     ARM,

@@ -13,6 +13,7 @@ from shared.clock import Clock
 from shared.messages.live import ServiceStatus
 from shared.messages.topics import STATUS
 from shared.runtime.beat import Beat
+from shared.runtime.build import commit
 from shared.runtime.process import Usage, usage
 
 IDLE_SECONDS = 0.05
@@ -35,6 +36,8 @@ class Health:
     counters: dict[str, int] = dataclasses.field(default_factory=dict[str, int])
     """Since the process started."""
     last_error: str = ""
+    policies: dict[str, int] = dataclasses.field(default_factory=dict[str, int])
+    """By agent, the newest policy version that it has."""
 
 
 class Ticking(Protocol):
@@ -124,4 +127,6 @@ class StatusReporter:
             rss_bytes=used.rss_bytes,
             last_error=health.last_error,
             version=self._version,
+            commit=commit(),
+            policies=dict(health.policies),
         )

@@ -1,15 +1,28 @@
 import json
 from pathlib import Path
 
+import msgspec
 import pytest
 from rich.console import Console
 
 from services.jobs import status
+from services.jobs.roll_call import RollCall
+from services.jobs.status_view import Heard, Snapshot, headline, lags, render
 from shared.bus.memory import MemoryHub
-from shared.clock import SystemClock
+from shared.clock import ManualClock, SystemClock
 from shared.errors import ConfigError
+from shared.messages.league import LeaseSummary, Schedule
 from shared.messages.live import Progress, ServiceStatus
-from shared.messages.topics import PROGRESS, STATUS
+from shared.messages.topics import PROGRESS, SCHEDULE, STATUS
+
+
+class PassingClock(ManualClock):
+    """Goes on by 10 ms whenever it is looked at."""
+
+    def now(self) -> float:
+        self.advance(0.01)
+        return super().now()
+
 
 ACTOR = ServiceStatus(
     role="actor", name="actor-0", boot="b", pid=1, host="h", state="playing",
@@ -24,28 +37,102 @@ PROGRESS_NOW = Progress(
 )  # fmt: skip
 
 
+LEARNER = ServiceStatus(
+    role="learner", name="learner-antagonist", boot="c", pid=2, host="big", state="learning",
+    policies={"antagonist": 12}, rss_bytes=1, version="1.0", commit="abc",
+)  # fmt: skip
+
+
+def shown(snapshot: Snapshot) -> list[str]:
+    """Return the lines that a person sees."""
+    console = Console(width=200)
+    with console.capture() as capture:
+        console.print(render(snapshot))
+    return capture.get().splitlines()
+
+
 def test_what_services_say_is_gathered_and_shown_as_one_row_each():
     hub = MemoryHub(SystemClock())
     service = hub.join("actor-0")
     service.publish(STATUS, ACTOR, role="actor", name="actor-0")
     service.publish(PROGRESS, PROGRESS_NOW)
-    snapshot = status.listen(hub.join("status"), SystemClock(), 0.02)
-    assert snapshot == status.Snapshot(services=(ACTOR,), progress=PROGRESS_NOW)
-    console = Console(width=160, record=True, quiet=False, file=None)
-    with console.capture() as capture:
-        console.print(status.table(snapshot))
-    row = capture.get().splitlines()[1]
+    call = RollCall(hub.join("status"), SystemClock())
+    call.listen(0.02)
+    snapshot = call.snapshot()
+    call.close()
+    assert snapshot.services == (ACTOR,)
+    assert snapshot.progress == PROGRESS_NOW
+    assert snapshot.missing == ()
+    (row,) = [line for line in shown(snapshot) if "actor-0" in line]
     for text in (
-        "actor-0", "playing", "learner-antagonist for 3.2 s", "samples_per_s 12,346",
-        "rollouts_dropped 2", "100 MiB", "lease lapsed",
+        "playing", "learner-antagonist for 3.2 s", "samples 12,346/s", "rollouts_dropped 2",
+        "100 MiB", "lease lapsed",
     ):  # fmt: skip
         assert text in row
     assert "refused" not in row
-    assert json.loads(json.dumps(status.to_json(snapshot)))["services"][0]["pid"] == 1
+    assert "silent" not in row
+    (said,) = json.loads(json.dumps(status.to_json(snapshot)))["services"]
+    assert (said["pid"], said["host"], said["policy_lags"]) == (1, "h", {})
+
+
+def test_processes_stand_under_their_host_and_who_runs_other_code_is_pointed_out():
+    actor = msgspec.structs.replace(ACTOR, policies={"antagonist": 9}, version="1.0", commit="def")
+    both = (actor, LEARNER)
+    processes = tuple(
+        Heard(status=one, silent_seconds=0.1, cpu_percent=7.0, lags=lags(both, one)) for one in both
+    )
+    lines = shown(Snapshot(processes=processes))
+    heads = [line.split()[0] for line in lines]
+    assert heads == ["process", "big", "learner-antagonist", "h", "actor-0", "different"]
+    assert "antagonist 12 " in lines[2]
+    assert "antagonist 9 (-3)" in lines[4]
+    assert "7 %" in lines[4]
+    assert lines[5].strip() == "different code is running: 1.0 (abc), 1.0 (def)"
+
+
+def test_who_has_fallen_silent_and_who_was_never_heard_is_said():
+    hub = MemoryHub(SystemClock())
+    clock = PassingClock()
+    service, league = hub.join("actor-0"), hub.join("league-0")
+    hub.join("actor-1").declare_alive("actor")
+    service.declare_alive("actor")
+    call = RollCall(hub.join("status"), clock)
+    service.publish(STATUS, ACTOR, role="actor", name="actor-0")
+    lease = LeaseSummary(
+        lease="L2", actor="actor-2", agent="antagonist", stage=0, opponent="x", seed=1
+    )
+    league.publish(SCHEDULE, Schedule(stage=None, leases=(lease,), versions={}))
+    call.listen(0.5)
+    clock.advance(20.0)
+    snapshot = call.snapshot()
+    assert snapshot.processes[0].silent_seconds >= 20.0
+    assert [(one.name, one.role) for one in snapshot.missing] == [
+        ("actor-1", "actor"), ("actor-2", "actor"),
+    ]  # fmt: skip
+    text = "\n".join(shown(snapshot))
+    assert "silent for 2" in text
+    assert "had lease L2 a moment ago" in text
+    clock.advance(1000.0)
+    call.listen(0.5)
+    assert call.snapshot().processes == ()
+
+
+def test_the_load_of_a_process_is_what_it_used_between_two_reports():
+    hub = MemoryHub(SystemClock())
+    clock = PassingClock()
+    service = hub.join("actor-0")
+    call = RollCall(hub.join("status"), clock)
+    for used in (10.0, 11.5):
+        said = msgspec.structs.replace(ACTOR, cpu_seconds=used)
+        service.publish(STATUS, said, role="actor", name="actor-0")
+        call.listen(0.5)
+        clock.advance(2.5)
+    (heard,) = call.snapshot().processes
+    assert heard.cpu_percent == pytest.approx(100.0 * 1.5 / 3.0, rel=0.2)
 
 
 def test_the_headline_says_who_learns_and_how_long_it_takes():
-    line = status.headline(PROGRESS_NOW)
+    line = headline(PROGRESS_NOW)
     assert (
         "iteration 1, stage 2/4, protagonist learns, update 3/120, score 1500 [1400, 1600]" in line
     )
