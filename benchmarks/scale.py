@@ -2,19 +2,23 @@
 
 `python -m benchmarks.scale --write` keeps what was measured in ``scaling/measured.json``, renews
 the tables and the figure of ``docs/scaling.md`` and adds a row to ``RESULTS.md``; ``--plan busy``
-does with less on a machine that others use.
+does with less on a machine that others use. Every run is kept in ``OUT/scale.jsonl`` as it ends,
+and a stopped measurement goes on with ``--out OUT``.
 """
 
 import argparse
+import datetime
 import json
 import os
 import sys
+import tempfile
 from pathlib import Path
 
 import msgspec
 
 from benchmarks.harness import ROOT
 from benchmarks.scaling import document
+from benchmarks.scaling.kept import KeptRuns
 from benchmarks.scaling.measure import Found
 from benchmarks.scaling.measure import measure as run_plan
 from benchmarks.scaling.plan import BUSY, FULL, SMOKE, Plan
@@ -25,14 +29,25 @@ from shared.runtime.logging import configure_logging
 QUESTION = "how well the scaling model predicts runs of real and of up to 1,000 synthetic actors"
 GOAL = 0.25
 """Median error of a prediction."""
+RUNS = "scale.jsonl"
 MEASURED = Path(__file__).parent / "scaling" / "measured.json"
 PLANS = {"full": FULL, "busy": BUSY, "smoke": SMOKE}
 
 
-def found_of(plan: Plan) -> Found:
-    """Return what a plan finds, telling stderr of each run."""
+def found_of(plan: Plan, runs: Path, *, only_kept: bool = False) -> Found:
+    """Return what a plan finds, telling stderr of each run.
+
+    Args:
+        plan: what to run.
+        runs: file of the runs; those in it are not made again.
+        only_kept: run nothing more.
+    """
     cores = len(os.sched_getaffinity(0))
-    return run_plan(plan, cores, lambda text: print(text, file=sys.stderr, flush=True))
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    return run_plan(plan, cores, KeptRuns(runs, say, only_kept=only_kept))
 
 
 def measurement(found: Found) -> Measurement:
@@ -66,7 +81,8 @@ def measurement(found: Found) -> Measurement:
 
 def measure(smoke: bool) -> Measurement:
     """Return the errors of the model's predictions."""
-    return measurement(found_of(SMOKE if smoke else FULL))
+    with tempfile.TemporaryDirectory() as folder:
+        return measurement(found_of(SMOKE if smoke else FULL, Path(folder) / RUNS))
 
 
 def main() -> None:
@@ -75,13 +91,21 @@ def main() -> None:
     parser.add_argument("--plan", choices=PLANS, default="full", help="(%(default)s)")
     parser.add_argument("--json", action="store_true", help="one JSON object")
     parser.add_argument("--write", action="store_true", help="renew docs/scaling.md and add a row")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="of the runs; goes on with them")
+    parser.add_argument("--finish", action="store_true", help="with the runs of --out, and no more")
     parser.add_argument("--read", action="store_true", help="renew the documents from what is kept")
     words = parser.parse_args()
     configure_logging(None)
     if words.read:
         document.write(ROOT / "docs", json.loads(MEASURED.read_bytes()))
         return
-    report = report_of("scale", lambda: measurement(found_of(PLANS[words.plan])), smoke=False)
+    stamp = datetime.datetime.now(datetime.UTC).strftime("%Y%m%d-%H%M%S")
+    runs = (words.out or ROOT / "runs" / f"scale-{stamp}") / RUNS
+
+    def found() -> Measurement:
+        return measurement(found_of(PLANS[words.plan], runs, only_kept=words.finish))
+
+    report = report_of("scale", found, smoke=False)
     print(json.dumps(report) if words.json else text_of(report))
     if words.write:
         kept = {

@@ -62,7 +62,7 @@ def conditions(kept: dict[str, Any]) -> str:
 def coefficients(cost: Coefficients) -> str:
     """Return the table of the coefficients."""
     rows = (
-        ("actor", "a sample", cost.actor_s, "physics, two policies, judging, encoding, sending"),
+        ("actor", "a sample", cost.actor_s, "physics, two policies, judging, encoding"),
         ("learner, main thread", "a sample", cost.ingest_s, "decoding, checking, holding"),
         ("learner, main thread", "a rollout", cost.ingest_rollout_s, "whatever its size"),
         ("learner, main thread", "a sample", cost.update_s, "PPO: four passes"),

@@ -5,7 +5,6 @@ import math
 import statistics
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,26 +12,27 @@ import msgspec
 
 from benchmarks.scaling import recorded
 from benchmarks.scaling.fit import LEAST_CPU, fit
-from benchmarks.scaling.model import Coefficients, Job, Site, learner_thread, loads, predict
+from benchmarks.scaling.kept import KeptRuns
+from benchmarks.scaling.model import Coefficients, Job, Site, loads, predict
+from benchmarks.scaling.parts import costs
 from benchmarks.scaling.plan import Plan, Step
 from benchmarks.scaling.site import (
     LEARNER,
     OVER_SOCKETS,
     START_SECONDS,
+    Crowd,
     ScalingSite,
+    Setup,
     scaling_site,
 )
 from benchmarks.slopes import slope
-from benchmarks.training_run import ENDLESS, training_run
-from services.learner.config import LearnerConfig
+from benchmarks.training_run import ENDLESS, WARM_VERSION, training_run
 from shared.bus.config import BusConfig
 from shared.bus.zenoh import open_zenoh
 from shared.clock import SystemClock
 from shared.errors import RiposteError
 from shared.messages.topics import POLICY, SCHEDULE
 from shared.messages.wire import encode
-
-Say = Callable[[str], None]
 
 
 class Check(msgspec.Struct, frozen=True, kw_only=True):
@@ -86,7 +86,7 @@ class Found(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def message_sizes(site: ScalingSite) -> dict[str, float]:
-    """Return the bytes of the schedule for each lease, and of an announced policy.
+    """Return the bytes of the schedule for each lease, of a policy announced, of a sample.
 
     Raises:
         RiposteError: nothing was announced.
@@ -105,21 +105,51 @@ def message_sizes(site: ScalingSite) -> dict[str, float]:
                 found["policy_bytes"] = float(len(encode(policy)))
     if len(found) < 2:
         raise RiposteError("no schedule or no policy was heard of the site")
-    return found
+    return found | {"sample_bytes": site.sample_bytes}
 
 
-def play(
-    site: ScalingSite, step: Step, plan: Plan, say: Say
-) -> tuple[dict[str, Any], list[Memory]]:
+def play(site: ScalingSite, step: Step, plan: Plan) -> dict[str, Any]:
     """Put one crowd on a site and return what was seen of it."""
     purpose, crowd = step
     site.populate(crowd)
     seen = site.watch(plan.seconds) | {"purpose": purpose}
-    say(
-        f"{site.setup.name}: {crowd.actors} actors, {seen['samples_per_s']:,.0f} samples/s, "
-        f"router {seen['router']:.3f}, learner {seen['learner']:.3f}, league {seen['league']:.3f}"
-    )
-    return seen, watch_memory(site, plan.memory_seconds) if purpose == "memory" else []
+    grown = watch_memory(site, plan.memory_seconds) if purpose == "memory" else []
+    return seen | {"memory": [msgspec.to_builtins(one) for one in grown]} | message_sizes(site)
+
+
+def play_all(plan: Plan, kept: KeptRuns) -> list[dict[str, Any]]:
+    """Return what was seen of every crowd of a plan."""
+    runs: list[dict[str, Any]] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for setup, steps in plan.sites:
+            names = {step: _name(setup, step[1]) for step in steps}
+            missing = [step for step in steps if not kept.has(names[step])]
+            with contextlib.ExitStack() as stack:
+                site: ScalingSite | None = None
+                if missing and not kept.only_kept:
+                    rollout = Path(folder) / f"rollout-{setup.num_envs}"
+                    recorded.record(rollout, setup.num_envs)
+                    site = stack.enter_context(scaling_site(setup, rollout, plan.lease_seconds))
+                for step in steps:
+                    seen = kept.get(names[step], lambda: play(_there(site), step, plan))  # noqa: B023
+                    if seen is None:
+                        continue
+                    runs.append(seen)
+                    kept.say(
+                        f"{names[step]}: {seen['samples_per_s']:,.0f} samples/s, router "
+                        f"{seen['router']:.3f}, learner {seen['learner']:.3f}, league "
+                        f"{seen['league']:.3f}"
+                    )
+    return runs
+
+
+def _name(setup: Setup, crowd: Crowd) -> str:
+    return f"{setup.name}, {crowd.actors} actors, {crowd.rollouts_per_s:g} rollouts/s"
+
+
+def _there(site: ScalingSite | None) -> ScalingSite:
+    assert site is not None  # it is opened where a run is missing
+    return site
 
 
 def watch_memory(site: ScalingSite, seconds: float) -> list[Memory]:
@@ -154,13 +184,8 @@ def real_run(actors: int, plan: Plan) -> dict[str, Any]:
         f"bus.lease_seconds={plan.lease_seconds}",
     )  # fmt: skip
     with training_run(words) as run:
+        run.wait_for_version(WARM_VERSION, deadline=2 * START_SECONDS)
         return run.window(plan.seconds) | {"actors": actors}
-
-
-def cpu_per_sample(run: dict[str, Any], prefix: str) -> float:
-    """Return the CPU seconds of some processes of a training run for a sample."""
-    spent = sum(used for name, used in run["cpu_s_by_process"].items() if name.startswith(prefix))
-    return spent / run["samples"]
 
 
 def synthetic_checks(found: Coefficients, run: dict[str, Any], cores: int) -> list[Check]:
@@ -207,56 +232,48 @@ def real_checks(found: Coefficients, run: dict[str, Any], cores: int) -> list[Ch
     ]  # fmt: skip
 
 
-def measure(plan: Plan, cores: int, say: Say) -> Found:
+def measure(plan: Plan, cores: int, kept: KeptRuns) -> Found:
     """Return coefficients and checks.
 
     Args:
         plan: what to run.
         cores: of this machine.
-        say: told of each run as it ends.
+        kept: runs made before, and where to keep those made now.
+
+    Raises:
+        RiposteError: too few runs came to work for any coefficient.
     """
-    runs: list[dict[str, Any]] = []
-    memory: list[Memory] = []
-    sizes: dict[str, float] = {}
-    skipped: list[str] = []
-    payload = 0.0
-    with tempfile.TemporaryDirectory() as name:
-        for setup, steps in plan.sites:
-            rollout = Path(name) / f"rollout-{setup.num_envs}"
-            recorded.record(rollout, setup.num_envs)
-            payload = rollout.stat().st_size / setup.rollout_samples
-            with scaling_site(setup, rollout, plan.lease_seconds) as site:
-                for step in steps:
-                    try:
-                        seen, grown = play(site, step, plan, say)
-                    except RiposteError as error:  # too many for this machine: the others count
-                        skipped.append(f"{setup.name}, {step[1].actors} actors: {error}")
-                        say(f"left out: {skipped[-1]}")
-                        continue
-                    runs.append(seen)
-                    memory += grown
-                sizes = sizes or message_sizes(site)
+    parts = kept.get("an actor and PPO alone", lambda: costs(plan.rounds))
+    runs = play_all(plan, kept)
+    fitted = [run for run in runs if run["purpose"] == "fit"]
+    if parts is None or not fitted:
+        raise RiposteError(f"too few runs for coefficients; left out: {'; '.join(kept.skipped)}")
+    kept.say(f"actor {1e6 * parts['actor_s']:.2f} us, PPO {1e6 * parts['update_s']:.2f} us")
     real: list[dict[str, Any]] = []
     for actors in plan.real_actors:
-        real.append(real_run(actors, plan))
-        say(f"{actors} real actors: {real[-1]['samples_per_s']:,.0f} samples/s")
-    fitted = [run for run in runs if run["purpose"] == "fit"]
-    found = fit(
-        fitted, actor_s=cpu_per_sample(real[0], "actor-"), rollout_bytes=payload, update_s=0.0,
-        schedule_bytes=sizes["schedule_bytes"], policy_bytes=sizes["policy_bytes"],
-    )  # fmt: skip
-    intake = learner_thread(found, Job(batch_samples=LearnerConfig().batch_samples))
-    all_of_it = cpu_per_sample(real[0], LEARNER)
-    found = msgspec.structs.replace(
-        found, update_s=max(0.0, all_of_it - intake - found.ingest_threads_s)
-    )
+        seen = kept.get(f"{actors} real actors", lambda: real_run(actors, plan))  # noqa: B023
+        if seen is not None:
+            real.append(seen)
+            kept.say(f"{actors} real actors: {seen['samples_per_s']:,.0f} samples/s")
+    cost = coefficients_of(fitted, parts)
     checks: list[Check] = []
     for run in runs:
         if run["purpose"] in ("check", "memory"):
-            checks += synthetic_checks(found, run, cores)
+            checks += synthetic_checks(cost, run, cores)
     for run in real:
-        checks += real_checks(found, run, cores)
+        checks += real_checks(cost, run, cores)
+    memory = [msgspec.convert(one, Memory) for run in runs for one in run["memory"]]
     return Found(
-        coefficients=found, cores=cores, checks=tuple(checks), memory=tuple(memory),
-        runs=tuple(runs), real=tuple(real), skipped=tuple(skipped),
+        coefficients=cost, cores=cores, checks=tuple(checks), memory=tuple(memory),
+        runs=tuple(runs), real=tuple(real), skipped=tuple(kept.skipped),
+    )  # fmt: skip
+
+
+def coefficients_of(fitted: list[dict[str, Any]], parts: dict[str, Any]) -> Coefficients:
+    """Return the coefficients that runs without PPO, and its cost and an actor's, give."""
+    most = max(fitted, key=lambda run: run["actors"])
+    return fit(
+        fitted, actor_s=parts["actor_s"], rollout_bytes=most["sample_bytes"],
+        update_s=parts["update_s"], schedule_bytes=most["schedule_bytes"],
+        policy_bytes=most["policy_bytes"],
     )  # fmt: skip

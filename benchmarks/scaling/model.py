@@ -26,7 +26,7 @@ class Coefficients(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     actor_s: float
-    """CPU seconds of an actor for a sample: physics, two policies, judging, encoding, sending."""
+    """CPU seconds of an actor for a sample: physics, two policies, judging, encoding."""
     rollout_bytes: float
     """Bytes of a sample on the wire."""
     learner_s: float

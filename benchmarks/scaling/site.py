@@ -99,6 +99,7 @@ class ScalingSite(RunReader):
         self.setup = setup
         self.endpoint = endpoint
         self.crowd = Crowd(0, 0.0)
+        self.sample_bytes = rollout.stat().st_size / setup.rollout_samples
         self._rollout = rollout
         self._lease_seconds = lease_seconds
         self._crowds = 0
