@@ -20,7 +20,7 @@ from services.jobs.chaos.timeline import WINDOW
 from shared.clock import Clock
 from shared.runtime.build import commit
 
-FULL_SECONDS = 90.0
+FULL_SECONDS = 300.0
 """Longest wait for the rate to be full again."""
 PAUSE = (0.3, 2.0)
 """Random pause before a fault (s)."""

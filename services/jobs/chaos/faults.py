@@ -8,7 +8,7 @@ import numpy as np
 
 SITE = TypeVar("SITE")
 
-UP_SECONDS = 60.0
+UP_SECONDS = 300.0
 """Longest wait for a process to come up again."""
 
 

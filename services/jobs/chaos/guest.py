@@ -13,7 +13,7 @@ import msgspec
 import structlog
 
 from services.actor.__main__ import build
-from services.jobs.chaos.lies import FORGED, FORGERIES, LIES
+from services.jobs.chaos.lies import FORGED, FORGERIES, LIES, POLICY_LIE
 from shared.bus import endpoints
 from shared.bus.base import Bus, Inbox, Pending, Subscription
 from shared.bus.faults import FaultPlan, FaultyBus
@@ -42,7 +42,7 @@ CONDUCTS = ("unreliable", "lying")
 
 
 class LyingBus:
-    """Wraps an actor's bus: every rollout goes out as it is, and a lie made of it behind it."""
+    """Wraps an actor's bus: behind each rollout goes a lie, until all of them are told."""
 
     def __init__(self, bus: Bus) -> None:
         self.name = bus.name
@@ -52,6 +52,7 @@ class LyingBus:
         self._policies = [bus.subscribe(POLICY, agent=agent) for agent in AGENTS]
         self._forgery = ""
         self._told = 0
+        self._has_corrupted = False
         genuine = endpoints.encode
 
         def written(message: Message) -> bytes:
@@ -117,29 +118,34 @@ class LyingBus:
         self._bus.close()
 
     def _tell(self, rollout: Rollout) -> None:
-        """Tell the next lie, made of a rollout."""
-        lie = tuple(LIES)[self._told % len(LIES)]
+        """Tell the next lie, made of a rollout; each is told once."""
+        if self._told == len(LIES):
+            return
+        lie = tuple(LIES)[self._told]
         self._told += 1
         told = LIES[lie](rollout)
         service = dataclasses.replace(ROLLOUT, max_bytes=NO_LIMIT)
-        self._note(lie, told.name, is_forged=told.sequence >= FORGED)
+        if told.sequence >= FORGED:
+            self._note(lie, told.name, is_forged=True)
         self._forgery = lie
         try:
             pending = self._bus.ask(service, told, ANSWER_SECONDS, agent=rollout.agent)
         finally:
             self._forgery = ""
-        self._answers.append((lie, told.name, pending))
+        if told.sequence >= FORGED:  # else it is the truth, told twice
+            self._answers.append((lie, told.name, pending))
 
     def _corrupt(self, policy: PolicyAnnouncement) -> None:
         """Send a learner's policy on with one byte changed: to the actors, and to the league."""
-        if policy.policy_version % 20 or self._told == 0:
+        if self._has_corrupted or self._told == 0:
             return
+        self._has_corrupted = True
         payload = policy.payload.copy()
         payload[len(payload) // 2] ^= 0xFF
         forged = msgspec.structs.replace(
             policy, payload=payload, policy_version=policy.policy_version + 1
         )
-        self._note("corrupt policy", forged.snapshot, is_forged=False)
+        self._note(POLICY_LIE, forged.snapshot, is_forged=False)
         self._bus.publish(POLICY, forged, agent=policy.agent)
         self._note("corrupt snapshot", forged.snapshot, is_forged=False)
         report = VersionReport(

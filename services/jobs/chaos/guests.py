@@ -2,14 +2,17 @@
 
 import signal
 import sys
+from collections import Counter
 
 from services.jobs.chaos.faults import UP_SECONDS, Blow, Chance, Fault
 from services.jobs.chaos.job import Job, JobEnded
+from services.jobs.chaos.lies import LIES, POLICY_LIE
 
 STAY_SECONDS = 8.0
 LEAVE_SECONDS = 20.0
-LIES_TOLD = 17
-"""Each lie once before the liar leaves."""
+ANSWERED_SECONDS = 10.0
+LIES_TOLD = len(LIES) + 1
+"""Each lie once before the liar leaves: but for the truth told twice, and two damaged policies."""
 
 
 def guest_command(job: Job, conduct: str, name: str, seed: int) -> list[str]:
@@ -26,6 +29,7 @@ def _host(job: Job, chance: Chance, conduct: str, *, is_told: bool) -> Blow:
     seed = int(chance.generator.integers(2**31))
     name = f"actor-{conduct}-{seed:08x}"
     told, refused = job.books.told.copy(), job.books.refused.copy()
+    policies = job.books.policies_refused
     acknowledged = len(job.books.acknowledged)
     guest = job.let_in(guest_command(job, conduct, name, seed))
     is_up = job.until(lambda: name in job.up, UP_SECONDS)
@@ -34,7 +38,7 @@ def _host(job: Job, chance: Chance, conduct: str, *, is_told: bool) -> Blow:
         job.rest(STAY_SECONDS)
         if is_told:
             job.until(lambda: (job.books.told - told).total() >= LIES_TOLD, UP_SECONDS)
-            job.rest(1.0)
+            job.until(lambda: _unanswered(job, told, refused) <= 0, ANSWERED_SECONDS)
     except JobEnded:
         guest.kill()
         raise
@@ -43,11 +47,21 @@ def _host(job: Job, chance: Chance, conduct: str, *, is_told: bool) -> Blow:
     over = job.clock.now()
     if not ended:
         guest.kill()
+    lies, answers = job.books.told - told, job.books.refused - refused
+    if job.books.policies_refused > policies:  # actors say so in their logs, not to the liar
+        answers[POLICY_LIE] = lies[POLICY_LIE]
     note = f"{len(job.books.acknowledged) - acknowledged} rollouts acknowledged meanwhile"
     return Blow(
         name, at, over, over if is_up else None, note,
-        dict(job.books.told - told), dict(job.books.refused - refused),
+        dict(lies), dict(answers),
     )  # fmt: skip
+
+
+def _unanswered(job: Job, told: Counter[str], refused: Counter[str]) -> int:
+    """Return how many lies have no answer yet; a damaged policy never gets one."""
+    lies = job.books.told - told
+    answered = (job.books.refused - refused).total() + (job.books.believed).total()
+    return lies.total() - answered - lies[POLICY_LIE]
 
 
 def _unreliable(job: Job, chance: Chance) -> Blow:
@@ -65,7 +79,7 @@ FAULTS: tuple[Fault[Job], ...] = (
         "all that it sends", _unreliable, seconds=15.0,
     ),
     Fault(
-        "lying-actor", "a third actor sends 17 kinds of forged and damaged messages",
+        "lying-actor", "a third actor sends 16 kinds of forged and damaged messages",
         "learner, league, actors", _lying, seconds=25.0,
     ),
 )  # fmt: skip

@@ -31,7 +31,7 @@ UNKNOWN = 0
 """Process id of a router that says that it is up before it is known which it is."""
 STALL_SECONDS = 2.0
 """Between two looks, above which the machine stood still for whoever is not served first."""
-BEGIN_SECONDS = 300.0
+BEGIN_SECONDS = 1800.0
 """Longest wait for a run to begin, on a machine that is busy."""
 CALM_SECONDS = 3 * WINDOW
 """Undisturbed at the start of a run, before the first fault."""

@@ -16,6 +16,9 @@ FORGED = 1 << 40
 STEPS = 10_000
 """Of a rollout that is over the limit of 8 MiB with 8 bouts."""
 
+POLICY_LIE = "corrupt policy"
+"""What goes to the actors, who do not answer."""
+
 Lie = Callable[[Rollout], Rollout]
 
 
