@@ -32,13 +32,19 @@ class Site:
     def __init__(self, folder: Path) -> None:
         self.endpoint = f"tcp/127.0.0.1:{free_port()}"
         self.port = free_port()
+        self.systemd = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.systemd.bind(str(folder / "notify"))
+        self.systemd.settimeout(30.0)
+        self._environment = {**os.environ, "NOTIFY_SOCKET": str(folder / "notify")}
         run = ("--run", str(folder), "--run-id", "r1")
         self._router = self._start("router", *run, "--listen", self.endpoint)
         settings = ("--set", f"metrics.port={self.port}", "--set", "bus.open_seconds=60")
         self.metrics = self._start("metrics", *run, "--connect", self.endpoint, *settings)
 
     def _start(self, module: str, *words: str) -> "subprocess.Popen[bytes]":
-        return subprocess.Popen([sys.executable, "-m", f"services.{module}", *words], cwd=ROOT)
+        return subprocess.Popen(
+            [sys.executable, "-m", f"services.{module}", *words], cwd=ROOT, env=self._environment
+        )
 
     def get(self, path: str) -> tuple[int, bytes]:
         try:
@@ -51,6 +57,7 @@ class Site:
         for process in (self.metrics, self._router):
             process.kill()
             process.wait()
+        self.systemd.close()
 
 
 @pytest.fixture
@@ -85,6 +92,10 @@ def test_prometheus_reads_every_metric_of_a_run_and_floods_change_nothing(
     assert shown["riposte_service_memory_bytes", own] > 1e6
 
     assert site.get("/healthz") == (200, b"ok\n")
+    assert site.systemd.recv(100).startswith(b"READY=1\n")
+    assert site.systemd.recv(100) == b"WATCHDOG=1"
+    alive = [ROOT / "deploy/docker/riposte-alive", tmp_path, "30"]
+    assert subprocess.run(alive, timeout=30, check=False).returncode == 0
     assert site.get("/../etc/passwd")[0] == 404
     for words in (b"POST /metrics HTTP/1.1\r\n\r\n", b"\0\xff\r\n\r\n", b"A" * 100_000):
         with socket.create_connection(("127.0.0.1", site.port), timeout=20) as client:
