@@ -279,4 +279,7 @@ def decode_event(kind: str, body: str | bytes) -> Event:
     event: type[Any] | None = _BY_KIND.get(kind)
     if event is None:
         raise ValueError(f"event kind {kind!r} is unknown; a newer Riposte wrote it")
-    return msgspec.json.decode(body, type=event)
+    try:
+        return msgspec.json.decode(body, type=event)
+    except RecursionError as error:
+        raise ValueError(f"the body of a {kind} is nested too deeply") from error

@@ -240,6 +240,15 @@ def _check(connection: sqlite3.Connection, path: Path) -> None:
             f"ledger {path} has schema version {version}, this Riposte reads {SCHEMA_VERSION}; "
             "use the version of Riposte that made the run"
         )
+    made = connection.execute(
+        "SELECT type, name, sql FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'"
+    ).fetchall()
+    if made != [("table", "events", _CREATE.strip())]:  # a view could count for ever
+        names = ", ".join(f"{kind} {name}" for kind, name, _ in made)[:200]
+        raise LedgerError(
+            f"ledger {path} is damaged (it is made of {names or 'nothing'}, expected the table "
+            f"events as the league makes it); {_RESTORE}"
+        )
     findings = " ".join(connection.execute("PRAGMA quick_check(1)").fetchone()[0].split())
     if findings != "ok":
         raise LedgerError(f"ledger {path} is damaged ({findings}); {_RESTORE}")

@@ -6,6 +6,7 @@ import numpy as np
 
 from services.robot_io.links import Floats
 from shared.errors import ConfigError, RiposteError
+from shared.runtime.arrays import read_array
 
 BAT = 13
 
@@ -36,8 +37,8 @@ def read_replay(path: Path) -> Floats:
 
 def _file(path: Path) -> Floats:
     try:
-        return np.asarray(np.load(path, allow_pickle=False), np.float64)
-    except (OSError, ValueError, TypeError) as error:
+        return read_array(path)
+    except (OSError, ValueError) as error:
         raise ConfigError(f"cannot read the recorded bat {path}: {error}") from error
 
 

@@ -25,6 +25,7 @@ from shared.game.rules import RuleBook
 from shared.messages.training import AGENTS
 from shared.runtime.files import atomic_write
 from shared.styles.features import FEATURES
+from shared.telemetry.archive import table_of
 
 SCHEMA = 1
 """Of the file; goes up when a column changes its meaning."""
@@ -145,11 +146,7 @@ def load(path: Path) -> BoutTable:
     if not path.is_file():
         raise RiposteError(f"there is no {path}; play the bouts with: riposte tournament RUN")
     try:
-        # In this thread: a pool that is still alive when the interpreter ends can abort it.
-        found = pq.read_table(
-            io.BytesIO(path.read_bytes()), page_checksum_verification=True, use_threads=False,
-            pre_buffer=False,
-        )  # fmt: skip
+        found = table_of(path.read_bytes())
     except (OSError, pa.ArrowException, ValueError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise _damaged(path, reason) from None
@@ -188,7 +185,7 @@ def _table(found: Any, path: Path, header: _Header) -> BoutTable:
         order = {name: k for k, name in enumerate(pool)}
         try:
             return np.array([order[name] for name in found.column(agent).to_pylist()], np.int32)
-        except KeyError as error:
+        except (KeyError, TypeError) as error:
             raise _damaged(path, f"its metadata names no {agent} {error}") from None
 
     return BoutTable(

@@ -43,6 +43,8 @@ SCHEMA = 1
 INFO_FILE = "bout.json"
 FINISHED, JOURNAL = ".parquet", ".arrows"
 METADATA_KEY = b"riposte"
+MAX_CELLS = 32_000_000
+"""Of one Parquet file: three hours of a bout."""
 ARROW_TYPES: dict[str, Any] = {
     "float": pa.float64(), "int": pa.int64(), "bool": pa.bool_(), "text": pa.string(),
 }  # fmt: skip
@@ -220,9 +222,11 @@ def read_journal(path: Path, stream: Stream) -> Rows | None:
         reader = pa.ipc.open_stream(pa.BufferReader(data))
         while True:
             try:
-                batches.append(reader.read_next_batch())
+                batch = reader.read_next_batch()
             except StopIteration:
                 break
+            batch.validate(full=True)  # Arrow itself believes every offset in it
+            batches.append(batch)
     if not batches:
         return None
     return _rows(pa.Table.from_batches(batches), stream, path)
@@ -293,11 +297,30 @@ def missing_ticks(ticks: Array) -> int:
 
 def _read_parquet(path: Path, stream: Stream) -> Rows:
     try:
-        found = pq.read_table(io.BytesIO(path.read_bytes()), page_checksum_verification=True)
+        found = table_of(path.read_bytes())
     except (OSError, pa.ArrowException, ValueError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise _damaged(path, reason) from None
     return _rows(found, stream, path)
+
+
+def table_of(data: bytes) -> Any:
+    """Return the table in a Parquet file that anybody may have made.
+
+    Raises:
+        OSError, pyarrow.ArrowException, ValueError: it is none, it is damaged, or too large.
+    """
+    # In this thread: a pool that is still alive when the interpreter ends can abort it.
+    file = pq.ParquetFile(
+        pa.BufferReader(data), pre_buffer=False, thrift_string_size_limit=1 << 20,
+        thrift_container_size_limit=1 << 16, page_checksum_verification=True,
+    )  # fmt: skip
+    rows, columns = file.metadata.num_rows, file.metadata.num_columns
+    if rows * columns > MAX_CELLS:  # a few bytes can say a billion rows
+        raise ValueError(f"{rows} rows of {columns} columns, at most {MAX_CELLS} cells are read")
+    table = file.read(use_threads=False)
+    table.validate(full=True)
+    return table
 
 
 def _leaf(column: Column) -> str:
@@ -332,8 +355,12 @@ def _batch(stream: Stream, rows: Rows) -> Any:
 
 def _rows(table: Any, stream: Stream, path: Path) -> Rows:
     columns: dict[str, Array] = {}
+    try:
+        names = table.column_names
+    except UnicodeDecodeError as error:
+        raise _damaged(path, f"the name of a column is {error}") from None
     for column in stream.columns:
-        if column.name not in table.column_names:
+        if column.name not in names:
             raise _damaged(path, f"it has no column {column.name!r}")
         columns[column.name] = _numbers(table.column(column.name), column, path)
     return Rows(columns)

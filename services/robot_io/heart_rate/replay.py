@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from services.robot_io.heart_rate.source import Beat
 from shared.clock import Clock
 from shared.errors import ConfigError
+from shared.runtime.arrays import read_array
 
 MAX_ROWS = 1_000_000
 LAST_SECONDS = 1.0
@@ -50,7 +51,7 @@ class HeartRateReplay:
         intervals: list[tuple[float, ...]] | None = None
         try:
             if path.suffix == ".npy":
-                rows = np.asarray(np.load(path, allow_pickle=False), np.float64)
+                rows = read_array(path)
             else:
                 rows, intervals = _read_table(path)
         except (OSError, ValueError, TypeError, KeyError, csv.Error) as error:
