@@ -24,7 +24,8 @@ PATIENCE = 0.1
 def open_session(endpoint: str) -> Any:
     """Return a session with the configuration that every process of a run has."""
     zenoh.init_log_from_env_or("error")
-    return zenoh.open(zenoh.Config.from_json5(client_json(BusConfig(connect=(endpoint,)))))
+    cfg = BusConfig(connect=(endpoint,))
+    return zenoh.open(zenoh.Config.from_json5(client_json(cfg, "operator")))
 
 
 def answer(endpoint: str) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import msgspec
 import structlog
 
+from shared.bus.access import access_control, size_limits
 from shared.bus.tls import files_of, tls_json
 from shared.errors import ConfigError
 from shared.messages.topics import MIB, SERVICES, TOPICS, Role
@@ -152,7 +153,7 @@ def client_json(cfg: BusConfig, role: Role) -> str:
     """Return Zenoh's configuration of a client: no scouting, no open socket.
 
     Raises:
-        ConfigError: an endpoint is not encrypted, or the role's certificate is not there.
+        ConfigError: there are certificates, and an endpoint is not encrypted.
     """
     config: dict[str, Any] = {
         "mode": "client",
@@ -175,7 +176,7 @@ def router_json(cfg: BusConfig) -> str:
     """Return Zenoh's configuration of a router, for ours and for zenohd.
 
     Raises:
-        ConfigError: it has no endpoint, one is not encrypted, or its certificate is not there.
+        ConfigError: it has no endpoint, or there are certificates and one is not encrypted.
     """
     if not cfg.listen:
         raise ConfigError(
@@ -191,7 +192,10 @@ def router_json(cfg: BusConfig) -> str:
         "max_sessions": 5000, "accept_pending": 1000, "accept_timeout": 2000,
     }  # fmt: skip
     _secure(config, cfg, "router", "listen", (*cfg.listen, *cfg.connect))
-    return json.dumps(config)
+    if cfg.certificates:
+        config["access_control"] = access_control()
+        config["low_pass_filter"] = size_limits()
+    return json.dumps(config, indent=1)
 
 
 def _secure(

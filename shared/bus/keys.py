@@ -3,6 +3,9 @@
 import re
 import string
 
+PREFIX = "riposte/v1"
+"""How every key on the bus begins; the name of the run is next."""
+
 _CHUNK = re.compile(r"[A-Za-z0-9._-]{1,255}")
 
 

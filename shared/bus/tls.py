@@ -28,13 +28,18 @@ class TlsFiles:
 
 
 def files_of(folder: str, role: str) -> TlsFiles:
-    """Return the files of a role in a folder of ``riposte certs``.
+    """Return where the files of a role are in a folder of ``riposte certs``."""
+    base = Path(folder).expanduser().absolute()
+    return TlsFiles(base / "ca.crt", base / f"{role}.crt", base / f"{role}.key")
+
+
+def check_files(folder: str, role: str) -> None:
+    """Refuse files of a role that cannot be read, and warn of a key that others can read.
 
     Raises:
-        ConfigError: one of them is missing or cannot be read.
+        ConfigError: says which, and where they come from.
     """
-    base = Path(folder).expanduser().resolve()
-    files = TlsFiles(base / "ca.crt", base / f"{role}.crt", base / f"{role}.key")
+    files = files_of(folder, role)
     for path in (files.authority, files.certificate, files.key):
         try:
             path.open("rb").close()
@@ -46,7 +51,6 @@ def files_of(folder: str, role: str) -> TlsFiles:
             ) from error
     if os.stat(files.key).st_mode & 0o007:
         log.warning("private_key_exposed", path=str(files.key), do=f"chmod 600 {files.key}")
-    return files
 
 
 def tls_json(files: TlsFiles) -> dict[str, Any]:

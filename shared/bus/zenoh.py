@@ -19,6 +19,7 @@ The client reconnects by itself within half a second of a router's return, but n
 import contextlib
 import secrets
 import threading
+from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias, TypeVar
 
@@ -31,9 +32,10 @@ from shared.bus.base import NoAnswer, Refused
 from shared.bus.config import BusConfig, client_json, router_json, warn_of_plain_network
 from shared.bus.counters import Counters
 from shared.bus.endpoints import Answer, Host, Present, Requests, Values, ask_of, too_long
-from shared.bus.keys import check_chunk, key_of, pattern_of
+from shared.bus.keys import PREFIX, check_chunk, key_of, pattern_of
 from shared.bus.latest import LatestSent, stamp_of
-from shared.bus.tls import files_of, why_refused
+from shared.bus.peers import Peers
+from shared.bus.tls import check_files, files_of, why_refused
 from shared.bus.watchdog import Watchdog
 from shared.clock import Clock
 from shared.errors import BusError, ConfigError, MessageError
@@ -47,7 +49,6 @@ Out = TypeVar("Out", bound=Message)
 Declare: TypeAlias = Callable[[zenoh.Session], Any]
 """Declares something in a session; returns the library's object."""
 
-PREFIX = "riposte/v1"
 UPKEEP_SECONDS = 0.25
 CLOSE_SECONDS = 3.0
 MOST_RUNS = 64
@@ -77,6 +78,8 @@ def open_zenoh(
     check_chunk("name", name)
     check_chunk("run", run)
     zenoh.init_log_from_env_or("error")
+    if cfg.certificates:
+        check_files(cfg.certificates, role)
     config = client_json(cfg, role)
     warn_of_plain_network(cfg)
     endpoints = ", ".join(cfg.routers)
@@ -111,27 +114,38 @@ class Router:
 
     def __init__(self, session: zenoh.Session, endpoints: tuple[str, ...]) -> None:
         self.endpoints = endpoints
+        self.peers = Peers()
         self._session = session
+        self._events = session.info.declare_link_events_listener(self._note, history=True)
 
-    @property
-    def num_sessions(self) -> int:
-        """Return how many processes are connected."""
-        return len(self._session.info.transports())
+    def sessions(self) -> Counter[str]:
+        """Return how many processes are connected, by role; those without are under ``""``."""
+        return Counter(link.auth_identifier or "" for link in self._session.info.links())
+
+    def _note(self, event: zenoh.LinkEvent) -> None:
+        link, came = event.link, event.kind == zenoh.SampleKind.PUT
+        self.peers.note(str(link.zid), link.auth_identifier or "", str(link.dst), came=came)
 
     def close(self) -> None:
         """Stop routing."""
         _close(self._session)
 
 
-def open_router(cfg: BusConfig) -> Router:
+def open_router(cfg: BusConfig, log_filter: str = "off") -> Router:
     """Return a running router on ``cfg.listen``.
+
+    Args:
+        cfg: of the bus.
+        log_filter: what the library writes to stdout; it would repeat our one line in twenty.
 
     Raises:
         ConfigError: it cannot listen there, or its certificate is not there.
     """
+    if cfg.certificates:
+        check_files(cfg.certificates, "router")
     config = router_json(cfg)
     warn_of_plain_network(cfg)
-    zenoh.init_log_from_env_or("off")  # it would repeat our one line in twenty of its own
+    zenoh.init_log_from_env_or(log_filter)
     try:
         return Router(_open(config), cfg.listen)
     except zenoh.ZError as error:

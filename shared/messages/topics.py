@@ -51,11 +51,21 @@ Role = Literal[
 """Who speaks on the bus; ``operator`` is what a person's commands are."""
 ROLES: tuple[Role, ...] = get_args(Role)
 SERVICE_ROLES: tuple[Role, ...] = tuple(role for role in ROLES if role != "operator")
+_SEEN_BY: dict[Role, tuple[Role, ...]] = {"referee": ("policy", "page"), "policy": ("page",)}
+WATCHERS: dict[Role, tuple[Role, ...]] = {
+    role: (*_SEEN_BY.get(role, ()), "operator") for role in SERVICE_ROLES
+}
+"""Who may know which processes of a role are alive."""
 CERTIFIED: tuple[str, ...] = ("router", *ROLES)
 """Common names of a site's certificates; the router carries what others say."""
 
 M = TypeVar("M", bound=Message)
 R = TypeVar("R", bound=Message)
+
+
+def key_role(role: Role) -> str:
+    """Return a role as keys have it."""
+    return role.replace("_", "-")
 
 
 class Qos(enum.Enum):

@@ -180,7 +180,7 @@ def test_junk_from_a_stranger_is_refused_and_counted(zenoh_world: Any) -> None:
     values, inbox = bus.subscribe(SCHEDULE), bus.answer(LEASE)
     prefix = f"riposte/v1/{world.run}/"
     rng = random.Random(0)
-    with zenoh.open(zenoh.Config.from_json5(client_json(world.cfg))) as stranger:
+    with zenoh.open(zenoh.Config.from_json5(client_json(world.cfg, "operator"))) as stranger:
         world.rest(0.3)
         junk = [rng.randbytes(rng.randrange(2000)) for _ in range(50)]
         for number, payload in enumerate(junk):

@@ -63,8 +63,8 @@ def test_what_is_not_a_stamp_is_refused(stamp: bytes) -> None:
 
 
 def test_endpoints_of_a_command_line_are_checked_as_those_of_a_file() -> None:
-    cfg = BusConfig().with_endpoints(connect=("tcp/10.0.0.1:1",), listen=("tcp/[::1]:2",))
-    assert (cfg.connect, cfg.listen) == (("tcp/10.0.0.1:1",), ("tcp/[::1]:2",))
+    cfg = BusConfig().with_endpoints(connect=("tcp/127.0.0.2:1",), listen=("tcp/[::1]:2",))
+    assert (cfg.connect, cfg.listen) == (("tcp/127.0.0.2:1",), ("tcp/[::1]:2",))
     assert BusConfig().with_endpoints() == BusConfig()
     with pytest.raises(ConfigError, match="connect has 'nowhere', expected an endpoint"):
         BusConfig().with_endpoints(connect=("nowhere",))
@@ -115,8 +115,8 @@ def test_a_bus_section_out_of_range_is_refused(change: dict[str, Any], what: str
 
 
 def test_nobody_is_searched_for_and_clients_listen_to_nothing() -> None:
-    cfg = BusConfig(connect=("tcp/10.0.0.1:7447",))
-    client, router = json.loads(client_json(cfg)), json.loads(router_json(cfg))
+    cfg = BusConfig(connect=("tcp/127.0.0.2:7447",))
+    client, router = json.loads(client_json(cfg, "operator")), json.loads(router_json(cfg))
     for config in (client, router):
         assert config["scouting"] == {
             "multicast": {"enabled": False}, "gossip": {"enabled": False},
@@ -124,7 +124,7 @@ def test_nobody_is_searched_for_and_clients_listen_to_nothing() -> None:
         assert config["adminspace"] == {"enabled": False}
         assert config["transport"]["link"]["rx"]["max_message_size"] == MAX_MESSAGE
     assert client["listen"] == {"endpoints": []}
-    assert client["connect"]["endpoints"] == ["tcp/10.0.0.1:7447"]
+    assert client["connect"]["endpoints"] == ["tcp/127.0.0.2:7447"]
     assert router["listen"]["endpoints"] == ["tcp/127.0.0.1:7447"]
 
 

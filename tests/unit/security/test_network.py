@@ -1,11 +1,13 @@
 """What a site file may ask of the network."""
 
 import json
+from pathlib import Path
 
 import pytest
 from structlog.testing import capture_logs
 
 from shared.bus.config import BusConfig, client_json, router_json, warn_of_plain_network
+from shared.bus.tls import check_files
 from shared.errors import ConfigError
 
 ELSEWHERE = ("tcp/192.168.1.5:7447", "tls/robot.example.org:7447", "tcp/0.0.0.0:7447", "tcp/[::]:1")
@@ -56,10 +58,21 @@ def test_with_certificates_plain_links_within_the_machine_are_refused_too() -> N
             make()
 
 
-def test_certificates_that_are_not_there_are_named(tmp_path) -> None:
-    cfg = BusConfig(connect=("tls/robot:7447",), certificates=str(tmp_path))
-    with pytest.raises(ConfigError, match=r"ca\.crt.*riposte certs"):
-        client_json(cfg, "actor")
+def test_certificates_that_are_not_there_are_named(tmp_path: Path) -> None:
+    (tmp_path / "ca.crt").write_text("")
+    with pytest.raises(ConfigError, match=r"actor\.crt: No such file.*riposte certs"):
+        check_files(str(tmp_path), "actor")
+
+
+def test_a_key_that_everybody_may_read_is_warned_of(tmp_path: Path) -> None:
+    for name in ("ca.crt", "actor.crt", "actor.key"):
+        (tmp_path / name).write_text("secret")
+    for mode, events in ((0o600, []), (0o640, []), (0o644, ["private_key_exposed"])):
+        (tmp_path / "actor.key").chmod(mode)
+        with capture_logs() as logs:
+            check_files(str(tmp_path), "actor")
+        assert [log["event"] for log in logs] == events
+        assert "secret" not in str(logs)
 
 
 def test_nobody_scouts_listens_or_speaks_another_protocol() -> None:
