@@ -134,6 +134,7 @@ def _held_out(found: Search) -> HeldOut:
         else Interval(low=0.0, high=0.0),
         joints_mrad=joints,
         tracker_mm=tracker,
+        is_floor_measured=problem.noise.is_measured,
     )
 
 

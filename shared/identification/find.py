@@ -7,14 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
+from shared.identification.again import fresh, leave_out
 from shared.identification.catalogue import effects
-from shared.identification.conclude import Conclusion, conclude, extended
+from shared.identification.conclude import Conclusion, conclude, extended, is_open
 from shared.identification.dataset.types import Dataset
 from shared.identification.effect import Effect
 from shared.identification.evidence import Evidence
 from shared.identification.gathered import evidence_of
 from shared.identification.leftover import leftovers
-from shared.identification.problem import Variant
+from shared.identification.problem import BLOCK, Variant
 from shared.identification.progress import Progress, silent
 from shared.identification.saved import load, save
 from shared.identification.search import Search, begin, search
@@ -66,11 +67,19 @@ def identify(
     if resume_folder is not None:
         save(resume_folder, dataset, seed, found)
     clock.over("base fit")
+    untouched = fresh(found, seed)
     search(found, progress)
     clock.over("search")
     progress("unexplained", 0.0)
     left = _left(found)
     clock.over("unexplained")
+    if is_open(found) and leave_out(untouched, left):
+        progress("screen", 0.0, "again, without held-out stretches in which something pushed")
+        found = untouched
+        search(found, progress)
+        clock.over("search")
+        left = _left(found)
+        clock.over("unexplained")
     progress("diagnostics", 0.0)
     evidence = _evidence(found)
     conclusion = conclude(found, left)
@@ -109,7 +118,10 @@ def _verdict(
         candidates=conclusion.candidates,
         ruled_out=found.ruled_out,
         base=conclusion.base,
-        caveats=tuple(f"{each.trajectory}: {each.text}".lstrip(": ") for each in dataset.caveats),
+        caveats=(
+            *_uncounted(found),
+            *(f"{each.trajectory}: {each.text}".lstrip(": ") for each in dataset.caveats),
+        ),
         record_next=_record_next(conclusion, dataset),
         starts_agree=found.base.starts_agree,
         dataset=dataset.hash,
@@ -119,6 +131,16 @@ def _verdict(
         commit=commit(),
         cpu_s=sum(seconds.values()),
         seconds=seconds,
+    )
+
+
+def _uncounted(found: Search) -> tuple[str, ...]:
+    blocks = sum(int(each.sum()) for each in found.problem.uncounted.values())
+    if not blocks:
+        return ()
+    return (
+        f"{BLOCK * blocks:.1f} s of the held-out recordings are not counted: something outside "
+        "pushed the arm there",
     )
 
 

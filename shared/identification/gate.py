@@ -72,11 +72,18 @@ class Gain:
 
 
 def stretches(problem: Problem, variant: Variant, segments: tuple[int, ...]) -> Float64:
-    """Return float64[S], mean square residual of each stretch of ``STRETCH``."""
+    """Return float64[S], mean square residual of each stretch of ``STRETCH``.
+
+    A part of a recording counts without the blocks that the problem says not to count.
+    """
     size = round(STRETCH / BLOCK)
     found: list[float] = []
-    for part in problem.residuals([variant], segments)[0]:
+    for segment, part in zip(segments, problem.residuals([variant], segments)[0], strict=True):
         power = np.mean(part**2, axis=1)
+        if segment in problem.uncounted:
+            power = power[~problem.uncounted[segment]]
+        if not len(power):
+            continue
         count = max(len(power) // size, 1)
         found += [float(np.mean(piece)) for piece in np.array_split(power, count)]
     return np.array(found)

@@ -23,6 +23,7 @@ from shared.identification.phases import (
 )
 from shared.identification.places import moving, place_of
 from shared.identification.problem import BLOCK, Problem, Variant
+from shared.identification.pushes import Push, is_one_way, pushes_of
 from shared.identification.scan import Width, merged, scan, stretches, width_of
 from shared.identification.tracks import Track, missing_of, tracks_of
 from shared.identification.verdict import Unexplained
@@ -33,12 +34,16 @@ LEAST_SIZE = 1.3
 """Of what is listed, in noise floors."""
 MOST = 12
 """Entries; the largest."""
+MOST_PUSHES = 40
+"""Of these, what came from outside is listed beside."""
 _GAP = 10
 """Blocks between stretches that are one."""
 _ALSO = 0.5
 """A joint is named too whose missing torque stands out so many times as much as the first's."""
 _NEAR = 5
 """Blocks that a power is taken over."""
+_AFTER = 50
+"""Blocks after a push in which what is off is put down to it."""
 _TURN = 1e-4
 """Of a difference quotient (rad, m)."""
 _BY_JOINT = 0.8
@@ -69,8 +74,11 @@ def leftovers(
     of_joints, of_trackers = _widths(problem)
     missing = _Missing(problem, variant)
     found: list[tuple[float, Unexplained]] = []
+    pushed: list[tuple[float, Unexplained]] = []
     if joints:
-        pieces = _pieces(joints, of_joints)
+        pushes = pushes_of(joints, [missing.of(track) for track in joints])
+        pushed = _pushed(problem, joints, pushes, missing)
+        pieces = _beside(_pieces(joints, of_joints), pushes)
         for group in _by_joint(problem, joints, pieces, missing):
             found += _told(problem, joints, group, missing)
     if trackers and of_trackers is not None:
@@ -78,7 +86,9 @@ def leftovers(
         for group in _behind(problem, trackers, pieces):
             found += _told(problem, trackers, group, None)
     found.sort(key=lambda each: -each[0])
-    return tuple(each for _, each in found[:MOST])
+    pushed.sort(key=lambda each: -each[0])
+    listed = [*found[:MOST], *pushed[:MOST_PUSHES]]
+    return tuple(each for _, each in sorted(listed, key=lambda each: -each[0]))
 
 
 class _Missing:
@@ -130,6 +140,44 @@ def _pieces(tracks: Sequence[Track], width: Width) -> list[list[list[slice]]]:
         ]
         for track, marks in zip(tracks, hot, strict=True)
     ]  # fmt: skip
+
+
+def _pushed(
+    problem: Problem, tracks: Sequence[Track], pushes: Sequence[Push], missing: _Missing
+) -> list[tuple[float, Unexplained]]:
+    """Return what came from outside, each entry with its energy."""
+    found: list[tuple[float, Unexplained]] = []
+    for push in pushes:
+        group = _Group(problem.subject.joints[push.joint], push.joint, {})
+        is_once = sum(each.joint == push.joint for each in pushes) == 1
+        words = ONCE if is_once else AT_TIMES
+        entry = _entry(problem, tracks[push.track], group, [push.piece], words, missing, True)
+        blocks = push.piece.stop - push.piece.start
+        found.append((blocks * entry.times_noise**2, entry))
+    return found
+
+
+def _beside(pieces: list[list[list[slice]]], pushes: Sequence[Push]) -> list[list[list[slice]]]:
+    """Return stretches without what a push, and what it left for a while, accounts for."""
+    out: list[list[list[slice]]] = []
+    for number, channels in enumerate(pieces):
+        pushed = [each.piece for each in pushes if each.track == number]
+        if not pushed:
+            out.append(channels)
+            continue
+        out.append([[left for piece in channel for left in _left(piece, pushed)]
+                    for channel in channels])  # fmt: skip
+    return out
+
+
+def _left(piece: slice, pushed: Sequence[slice]) -> list[slice]:
+    """Return what of a stretch is in no push nor soon after one."""
+    hot = np.ones(piece.stop - piece.start, np.bool_)
+    for each in pushed:
+        begin, end = each.start - _NEAR - piece.start, each.stop + _AFTER - piece.start
+        hot[max(begin, 0) : max(end, 0)] = False
+    edges = np.flatnonzero(np.diff(np.r_[False, hot, False].astype(np.int8))).reshape(-1, 2)
+    return [slice(piece.start + int(a), piece.start + int(b)) for a, b in edges if b - a >= _NEAR]
 
 
 def _by_joint(
@@ -207,7 +255,9 @@ def _told(
         if index in torques
         for piece in merged(pieces, _GAP)
     ]
+    is_external = False
     if len(pushes) == 1 and pushes[0] is not None:
+        is_external = any(is_one_way(each[pushes[0]]) for each in torques.values())
         phase = Phase(ONCE)  # where friction holds, the arm stays off when the push is over
     words = _words(problem, phase, group)
     found: list[tuple[float, Unexplained]] = []
@@ -219,7 +269,7 @@ def _told(
             there = pieces
             if phase.words == ONCE and index in torques:
                 there = [push_of(torques[index], piece) or piece for piece in pieces]
-            entry = _entry(problem, track, group, there, words, missing)
+            entry = _entry(problem, track, group, there, words, missing, is_external)
             if entry.times_noise >= LEAST_SIZE:
                 blocks = sum(piece.stop - piece.start for piece in pieces)
                 found.append((blocks * entry.times_noise**2, entry))
@@ -253,7 +303,7 @@ def _look(problem: Problem, track: Track, pieces: list[slice], channels: NDArray
 
 def _entry(
     problem: Problem, track: Track, group: _Group, pieces: list[slice], words: str,
-    missing: _Missing | None,
+    missing: _Missing | None, is_external: bool,
 ) -> Unexplained:  # fmt: skip
     rows = _rows(pieces)
     torque = None
@@ -283,6 +333,7 @@ def _entry(
         times_noise=times,
         torque=torque,
         torque_unit=torque_unit,
+        is_external=is_external,
     )
 
 

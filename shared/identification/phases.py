@@ -155,8 +155,8 @@ def _rules(looks: Sequence[Look], joint: int) -> list[tuple[float, Phase]]:
 
     speed = joined(lambda look: np.abs(look.qd[:, joint]))
     load = joined(lambda look: np.abs(look.effort[:, joint]))
-    turned = joined(lambda look: _since_reversal(look.qd[:, joint]))
-    shifted = joined(lambda look: _since_reversal(look.load[:, joint]))
+    turned = joined(lambda look: since_reversal(look.qd[:, joint]))
+    shifted = joined(lambda look: since_reversal(look.load[:, joint]))
     q = joined(lambda look: look.q[:, joint])
     over = [
         ("while fast", [speed > limit for limit in np.quantile(speed, _QUANTILES)]),
@@ -223,7 +223,7 @@ def _ranges(q: Float64, level: Float64) -> list[np.ndarray]:
     return tries
 
 
-def _since_reversal(values: Float64) -> Float64:
+def since_reversal(values: Float64) -> Float64:
     """Return float64[B], the time since the sign changed (s); what is small has no sign."""
     small = 0.05 * float(np.quantile(np.abs(values), 0.98))
     out = np.full(len(values), np.inf)

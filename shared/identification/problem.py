@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shared.identification.base import BaseParameter, enter_base
 from shared.identification.dataset.types import Dataset, Float64
@@ -48,6 +49,8 @@ class Problem:
     noise: Noise
     window: float | None = None
     """Length of the parts that are replayed (s); None for as long as they come."""
+    uncounted: dict[int, NDArray[np.bool_]] = field(default_factory=dict[int, NDArray[np.bool_]])
+    """bool[B] by segment: blocks that no loss counts, since something outside acted there."""
     segments: tuple[Segment, ...] = field(init=False)
     _structures: dict[Structure, Rollouts] = field(default_factory=dict[Structure, Rollouts])
     _bins: dict[int, tuple["_Bins", "_Bins | None"]] = field(init=False)

@@ -140,7 +140,7 @@ def begin(
     if fits is not None:
         known = tuple(each for each in known if each.name in fits.names)
     problem = Problem(subject, dataset, known, noise)
-    progress("base fit", 0.0, f"{len(known)} parameters")
+    progress("base fit", 0.0, f"{len(known)} parameters" + ("" if fits is None else ", kept"))
     space = Space(problem)
     done = fit_base(space, rng) if fits is None else fit_again(space, fits)
     if fits is None and (doubted := _doubted(done.whole)):

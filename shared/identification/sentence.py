@@ -11,11 +11,12 @@ def sentence_of(
     left: tuple[Unexplained, ...],
 ) -> str:
     """Return the verdict for people."""
-    ratio = f"{held_out.base_fit:.2f} times the noise"
+    floor = "the noise" if held_out.is_floor_measured else "what the base fit usually leaves"
+    ratio = f"{held_out.base_fit:.2f} times {floor}"
     if word == "named":
         return (
             f"What the simulation gets wrong: {_named(causes)}. Held out, the residual goes from "
-            f"{ratio} to {held_out.extended:.2f}."
+            f"{ratio} to {held_out.extended:.2f}.{_also_pushed(left)}"
         )
     if word == "tie":
         either = " or ".join(label(cause) for cause in ties[0].causes)
@@ -36,8 +37,24 @@ def sentence_of(
             f"Something is wrong that no effect of the catalogue explains. Nearest comes {names}, "
             f"but from {ratio} it leaves {held_out.extended:.2f}, which is too much to believe it."
         )
+    if left and all(each.is_external for each in left):
+        return f"Nothing to name but what came from outside.{_also_pushed(left)}"
     place = f", most of it at {left[0].where} {left[0].phase}" if left else ""
     return f"Something is wrong that no effect of the catalogue explains: {ratio}{place}."
+
+
+def _also_pushed(left: tuple[Unexplained, ...]) -> str:
+    """Return what came from outside, the largest first; a sentence after a blank, or nothing."""
+    pushes = [each for each in left if each.is_external]
+    if not pushes:
+        return ""
+    first = pushes[0]
+    count = "once," if len(pushes) == 1 else f"{len(pushes)} times, most"
+    size = "" if first.torque is None else f" with {first.torque:.2g} {first.torque_unit}"
+    return (
+        f" Something outside pushed {first.where} {count} from "
+        f"{first.begin:.2f} to {first.end:.2f} s of {first.trajectory}{size}."
+    )
 
 
 def label(cause: Cause) -> str:

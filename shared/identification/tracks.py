@@ -141,7 +141,10 @@ def _joints(problem: Problem, segment: int, reports: Reports) -> tuple[Float64, 
     x = block_means(at, problem.segments[segment].q - reports.q, BLOCK) / problem.noise.joints
     middles = block_means(at, recorded.joints_at[:, None], BLOCK)[:, 0]
     if recorded.begin > 0.0:
-        x /= _spread(at, middles)[:, None]
+        spread = _spread(at, middles)
+        if not problem.noise.is_measured:  # then the floor is what parts leave, spread and all
+            spread /= np.median(spread)
+        x /= spread[:, None]
     return recorded.begin + middles, x
 
 

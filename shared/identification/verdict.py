@@ -93,6 +93,9 @@ class HeldOut(_Part, frozen=True, kw_only=True):
     joints_mrad: dict[str, float]
     """Keys ``nominal``, ``base_fit``, ``extended``, ``noise_floor``; mm for sliding joints."""
     tracker_mm: dict[str, float] = {}
+    is_floor_measured: bool = True
+    """Whether recordings that repeat each other measured the noise floor. Else 1 is what the base
+    fit usually leaves (the median) of the motion that it was fitted to, in parts of a second."""
 
 
 class Scored(_Part, frozen=True, kw_only=True):

@@ -117,7 +117,7 @@ def unexplained(verdict: Verdict, evidence: Evidence) -> Html:
             left.where,
             left.trajectory,
             f"{words.number_text(left.begin)} to {words.number_text(left.end)}",
-            left.phase,
+            words.when_text(left),
             words.quantity_text(left.size, left.unit),
             words.number_text(left.times_noise, 2),
         )

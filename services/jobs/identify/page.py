@@ -92,7 +92,9 @@ def _tiles(verdict: Verdict) -> list[tuple[Node, Node, str]]:
     last = getattr(held_out, stages_of(verdict)[-1])
     tiles.append((
         f"{words.number_text(held_out.nominal)} \N{RIGHTWARDS ARROW} {words.number_text(last)}",
-        "times the noise floor, nominal model to the best",
+        "times the noise floor, nominal model to the best"
+        if held_out.is_floor_measured
+        else f"nominal model to the best; {words.floor_text(held_out)}",
         "",
     ))  # fmt: skip
     if verdict.ties:
@@ -161,7 +163,7 @@ def _held_out(verdict: Verdict, evidence: Evidence) -> Html:
     ]
     floor = _of(held_out.joints_mrad, "noise_floor")
     rows.append((
-        "noise floor",
+        "noise floor" if held_out.is_floor_measured else "noise floor, not measured",
         words.number_text(held_out.noise_floor),
         floor,
         *((_of(held_out.tracker_mm, "noise_floor"),) if held_out.tracker_mm else ()),
@@ -175,6 +177,8 @@ def _held_out(verdict: Verdict, evidence: Evidence) -> Html:
     )
     if not verdict.causes:
         caption = "Root-mean-square residual on trajectories that nothing was fitted to."
+    if not held_out.is_floor_measured:
+        caption += f" {words.floor_text(held_out)}."
     each = [
         (
             replay.name,

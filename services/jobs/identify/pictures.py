@@ -17,7 +17,7 @@ from services.jobs.identify.residuals import (
     window_of,
     worst_joint,
 )
-from services.jobs.identify.words import unexplained_mark
+from services.jobs.identify.words import floor_text, unexplained_mark
 from shared.identification.dataset.types import Float64
 from shared.identification.evidence import Diagnostics, Evidence
 from shared.identification.verdict import BaseValue, Scored, Verdict
@@ -55,9 +55,8 @@ def stages(verdict: Verdict) -> Picture:
     values = {"nominal": held_out.nominal, "base_fit": held_out.base_fit}
     if "extended" in stages_of(verdict):
         values["extended"] = held_out.extended
-    words = (
-        "Root-mean-square residual on motion that nothing was fitted to. 1 is as good as it gets."
-    )
+    best = "1 is as good as it gets" if held_out.is_floor_measured else floor_text(held_out)
+    words = f"Root-mean-square residual on motion that nothing was fitted to. {best}."
     return Picture(figures.stages_against_noise(values), words)
 
 

@@ -83,13 +83,23 @@ def held_out_text(held_out: HeldOut) -> str:
     """Return how far off each stage is on motion that nothing was fitted to."""
     text = (
         f"{number_text(held_out.nominal)} nominal, {number_text(held_out.base_fit)} with base "
-        f"parameters fitted, {number_text(held_out.extended)} extended; 1 is the noise floor"
+        f"parameters fitted, {number_text(held_out.extended)} extended; {floor_text(held_out)}"
     )
     if held_out.tracker_mm:
         ends = [held_out.tracker_mm.get(stage) for stage in ("base_fit", "extended")]
         if ends[0] is not None and ends[1] is not None:
             text += f" (tracker {number_text(ends[0])} to {number_text(ends[1])} mm)"
     return text
+
+
+def floor_text(held_out: HeldOut) -> str:
+    """Return what 1 is."""
+    if held_out.is_floor_measured:
+        return "1 is the noise floor"
+    return (
+        "1 is what the base fit usually leaves where it was fitted, for no recording repeats "
+        "another and the noise is not known"
+    )
 
 
 def tie_text(tie: Tie) -> str:
@@ -105,9 +115,14 @@ def unexplained_text(left: Unexplained) -> str:
     size = quantity_text(left.size, left.unit)
     return (
         f"{left.where}, {left.trajectory} from {number_text(left.begin)} to "
-        f"{number_text(left.end)} s, {left.phase}: {size}, "
-        f"{number_text(left.times_noise)} times the noise"
+        f"{number_text(left.end)} s, {when_text(left)}: {size}, "
+        f"{number_text(left.times_noise)} times the noise floor"
     )
+
+
+def when_text(left: Unexplained) -> str:
+    """Return when something is left, and whether it came from outside."""
+    return f"external, {left.phase}" if left.is_external else left.phase
 
 
 def unexplained_mark(number: int) -> str:

@@ -1,5 +1,9 @@
 """Each word of the verdict, from searches put together by hand."""
 
+import copy
+import dataclasses
+
+import msgspec
 import numpy as np
 import pytest
 
@@ -42,6 +46,27 @@ def test_a_base_at_the_noise_has_nothing_to_name(searches: Searches):
 
 def test_what_happened_once_is_not_passed_over(searches: Searches):
     assert conclude(searches.search(_GOOD), (_PUSH,)).word == "unexplained"
+
+
+def test_a_push_beside_a_cause_is_told_with_it(searches: Searches):
+    push = msgspec.structs.replace(_PUSH, is_external=True, torque=2.0, torque_unit="N m")
+    found = conclude(searches.search(_BAD, searches.tried(ELBOW, _BAD, _GOOD)), (push,))
+    assert found.word == "named"
+    assert "pushed elbow once, from 0.50 to 0.60 s of first with 2 N m" in found.sentence
+    alone = conclude(searches.search(_GOOD), (push, push))
+    assert alone.word == "unexplained"
+    assert "Nothing to name but what came from outside" in alone.sentence
+    assert "2 times" in alone.sentence
+
+
+def test_a_floor_that_nothing_measured_is_not_called_the_noise(searches: Searches):
+    found = searches.search(_BAD, searches.tried(ELBOW, _BAD, _GOOD))
+    assert "times the noise" in conclude(found, ()).sentence
+    problem = copy.copy(found.problem)
+    problem.noise = dataclasses.replace(problem.noise, is_measured=False)
+    guessed = conclude(dataclasses.replace(found, problem=problem), ())
+    assert not guessed.held_out.is_floor_measured
+    assert "times what the base fit usually leaves" in guessed.sentence
 
 
 def test_causes_that_do_as_well_are_a_tie(searches: Searches):

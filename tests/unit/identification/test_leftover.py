@@ -74,6 +74,7 @@ def test_a_push_is_located_at_its_joint_and_within_a_tenth_of_a_second(
     assert found[0].end == pytest.approx(3.3, abs=0.1)
     assert found[0].torque == pytest.approx(torque, rel=0.3)
     assert found[0].unit == "rad"
+    assert found[0].is_external
 
 
 @pytest.mark.parametrize("recording", ["first", "second"])
@@ -92,6 +93,7 @@ def test_a_tracker_that_slips_is_off_from_a_time_on(tmp_path: Path, recording: s
     assert first.begin == pytest.approx(4.0, abs=0.1)
     assert first.size == pytest.approx(0.004, rel=0.2)
     assert first.torque is None
+    assert not first.is_external
 
 
 def test_play_of_a_gear_shows_after_reversals_of_the_load(tmp_path: Path) -> None:
@@ -102,6 +104,7 @@ def test_play_of_a_gear_shows_after_reversals_of_the_load(tmp_path: Path) -> Non
     assert {each.trajectory for each in motor} == {"first", "second"}
     assert {each.trajectory for each in link} == {"first", "second"}
     assert len(found) == 4
+    assert not any(each.is_external for each in found)
 
 
 def test_drag_is_left_at_its_joint_while_it_is_fast_until_it_is_in_the_model(

@@ -2,13 +2,16 @@
 
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from services.jobs.identify.words import (
+    held_out_text,
     number_text,
     quantity_text,
     share_text,
     unexplained_mark,
+    unexplained_text,
     verdict_text,
 )
 from shared.identification.verdict import Interval
@@ -55,6 +58,21 @@ def test_shares_are_in_percent() -> None:
 
 def test_places_have_letters_then_numbers() -> None:
     assert [unexplained_mark(k) for k in (0, 25, 26)] == ["A", "Z", "27"]
+
+
+def test_a_floor_that_nothing_measured_is_not_called_the_noise() -> None:
+    measured = example("none").verdict.held_out
+    guessed = msgspec.structs.replace(measured, is_floor_measured=False)
+    assert "1 is the noise floor" in held_out_text(measured)
+    assert "noise floor" not in held_out_text(guessed)
+    assert "1 is what the base fit usually leaves" in held_out_text(guessed)
+
+
+def test_what_came_from_outside_is_called_external() -> None:
+    left = example("unexplained").verdict.unexplained[0]
+    pushed = msgspec.structs.replace(left, is_external=True)
+    assert "external" not in unexplained_text(left)
+    assert "7.7 to 8.7 s, external, once:" in unexplained_text(pushed)
 
 
 @pytest.mark.parametrize("word", WORDS)
