@@ -15,7 +15,7 @@ export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help train play rehearse test check format test-all slow chaos bench soak docs clean
+.PHONY: help train play rehearse test check format test-all slow chaos fuzz bench soak docs clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -60,6 +60,9 @@ slow: $(STAMP) ## whole runs, the quick budget of both phases among them
 
 chaos: $(STAMP) ## tests that kill, delay and lose things
 	@$(BIN)/pytest -q -m chaos tests $(TEST_FLAGS)
+
+fuzz: $(STAMP) ## a million hostile inputs; ARGS='--atheris wire/Rollout --inputs 100000' by coverage
+	@$(BIN)/python -m tests.fuzz $(ARGS)
 
 check: $(STAMP) ## format, lint, types, import rules
 	@$(BIN)/ruff format --check --quiet --output-format=concise . || \

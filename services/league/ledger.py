@@ -281,6 +281,8 @@ def _explained(path: Path) -> Generator[None]:
     """Turn SQLite's errors into one line that says what to do."""
     try:
         yield
+    except UnicodeDecodeError as error:  # SQLite quotes a damaged schema in its error
+        raise LedgerError(f"ledger {path} is damaged ({error}); {_RESTORE}") from error
     except sqlite3.Error as error:
         code = getattr(error, "sqlite_errorcode", 0)
         primary = code & 0xFF

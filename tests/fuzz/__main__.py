@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from tests.fuzz.campaign import Plan, Progress, run, save_faults
-from tests.fuzz.registry import GROUPS
+from tests.fuzz.registry import ALL, GROUPS, targets_of
 from tests.fuzz.target import MIB
 
 MILLION = 1_000_000
