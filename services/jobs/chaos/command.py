@@ -127,7 +127,9 @@ def _conclude(
         console.print(said)
     if found.write:
         machine = describe_machine((0.0, 0.0, 0.0))
-        where = f"Measured on {machine.cores} x {machine.name}, Python {machine.python}."
+        loads = [injection.load for injection in records.injections if injection.load]
+        busy = f", load average per core {min(loads):.1f} to {max(loads):.1f}" if loads else ""
+        where = f"Measured on {machine.cores} x {machine.name}, Python {machine.python}{busy}."
         write_block(SOURCE_ROOT / PAGE, markdown(rows, said, where))
     if not is_whole:
         return EXIT_INTERRUPTED

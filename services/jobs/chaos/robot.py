@@ -22,7 +22,7 @@ from services.jobs.who import operator
 from services.robot_io.config import SafetyConfig
 from shared.bus.base import Bus, Pending
 from shared.config.site import load_section
-from shared.errors import ConfigError
+from shared.errors import BusError, ConfigError
 from shared.messages.play import BatStates, GateReply, GateRequest, GateState, RefereeState
 from shared.messages.topics import ARM, BATS, GATE, REFEREE
 from shared.runtime.serve import ServeArgs, open_site_bus
@@ -48,7 +48,7 @@ FENCE_SECONDS = 180.0
 MOVES = 0.01
 """A robot whose tool went so far in ``SEEN`` states fences (m)."""
 SEEN = 30
-WATCHER = ("bus.open_seconds=60.0", "bus.give_up_seconds=3600.0")
+WATCHER = ("bus.open_seconds=2.0", "bus.give_up_seconds=3600.0")
 """Settings of the watcher's own bus."""
 ANSWER_SECONDS = 3.0
 JUMP_SECONDS = 3.0
@@ -86,7 +86,7 @@ class Match(Job):
         """Take what is new: logs, states, gate, referee."""
         super().poll()
         if self._bus is None:
-            with contextlib.suppress(ConfigError):
+            with contextlib.suppress(ConfigError, BusError):  # not there yet, or not now
                 place = self.endpoint
                 args = ServeArgs(
                     role="chaos", site=None, name="chaos", run=self.folder, run_id=place.run,
@@ -151,13 +151,15 @@ class Match(Job):
         if self._asked is None and self._mode in SHUT:
             action = "reset" if self._mode == "tripped" else "arm"
             asked = GateRequest(action=action, operator=operator())
+            if action == "arm":
+                self._rules.note_arming(may_open=True)
             self._asked = self._bus.ask(ARM, asked, ANSWER_SECONDS)
             self._is_arming = action == "arm"
         elif self._asked is not None and (reply := self._asked.take()) is not None:
             self._asked = None
             self._ask_at = self.clock.now() + 0.3
-            if self._is_arming and isinstance(reply, GateReply) and reply.accepted:
-                self._rules.armed()
+            if self._is_arming and isinstance(reply, GateReply) and not reply.accepted:
+                self._rules.note_arming(may_open=False)
 
     def after(self, blow: Blow) -> Blow:
         """See that a robot that was shut stays where it is, then have it fence again."""

@@ -30,9 +30,9 @@ class Rules:
         self.checked = 0
         """States looked at."""
 
-    def armed(self) -> None:
-        """Note that a person's arming was accepted."""
-        self._was_shut = False
+    def note_arming(self, *, may_open: bool) -> None:
+        """Note that a person asks to arm, or was told that it is not done."""
+        self._was_shut = not may_open
 
     def broken_by(self, gate: GateState) -> bool:
         """Return whether a state shows a command that must not be."""

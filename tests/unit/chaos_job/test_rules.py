@@ -60,5 +60,12 @@ def test_a_gate_that_opens_by_itself_after_a_trip_is_seen(rules: Rules):
 def test_a_person_may_open_it(rules: Rules):
     rules.broken_by(gate(0))
     rules.broken_by(gate(1, "tripped", is_sent=False))
-    rules.armed()
+    rules.note_arming(may_open=True)
     assert not rules.broken_by(gate(2, "ramping"))
+
+
+def test_a_person_who_was_refused_has_not_opened_it(rules: Rules):
+    rules.broken_by(gate(0, "tripped", is_sent=False))
+    rules.note_arming(may_open=True)
+    rules.note_arming(may_open=False)
+    assert rules.broken_by(gate(1, "ramping"))
