@@ -14,7 +14,6 @@ import socket
 import sys
 import tempfile
 import threading
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
@@ -25,6 +24,7 @@ from shared.bus.base import Bus, NoAnswer, Refused
 from shared.bus.config import BusConfig
 from shared.bus.zenoh import hear_runs, open_zenoh
 from shared.clock import Clock
+from shared.config import toml
 from shared.config.site import SECTIONS, raw_sections
 from shared.errors import ConfigError
 from shared.messages.league import RunSettings, SettingsRequest
@@ -106,8 +106,8 @@ def merged(settings: RunSettings, own: Tables, model: Path | None) -> Tables:
         ConfigError: the league said something else than sections.
     """
     try:
-        said: dict[str, Any] = tomllib.loads(settings.toml)
-    except tomllib.TOMLDecodeError as error:
+        said: dict[str, Any] = toml.parse(settings.toml)
+    except ValueError as error:
         raise ConfigError(f"the settings of the run are not TOML: {error}") from error
     if wrong := [name for name in said if name not in (*SAME, "actor")]:
         raise ConfigError(f"the settings of the run have [{wrong[0]}], which is not theirs to say")

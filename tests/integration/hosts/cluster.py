@@ -2,20 +2,25 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
+from shared.bus.config import BusConfig
+from shared.bus.zenoh import open_zenoh
+from shared.clock import SystemClock
+from shared.messages.topics import PROGRESS
 from shared.runtime.process import THREAD_LIMITS
 from shared.testing.network.hosts import Host, Network
 
 ROOT = Path(__file__).resolve().parents[3]
 PORT = 7447
 RIPOSTE = (sys.executable, "-P", "-m", "services.cli")
-END_SECONDS = 60.0
 
 
 class Cluster:
@@ -55,7 +60,8 @@ class Cluster:
     def join(self, host: Host, *words: str) -> "subprocess.Popen[bytes]":
         """Start an actor on a host, which knows an address and has its certificate."""
         where = ("--connect", self.endpoint, "--certificates", str(self.certificates))
-        return self.start(host, "actor", *where, *words)
+        patience = ("--set", "bus.open_seconds=120")  # for the router, which starts meanwhile
+        return self.start(host, "actor", *where, *patience, *words)
 
     def status(self, *words: str) -> dict[str, Any]:
         """Return what `riposte status --json` says to the operator, on a machine of the network."""
@@ -65,10 +71,91 @@ class Cluster:
         )  # fmt: skip
         return json.loads(done.stdout) if done.returncode == 0 else {"services": []}
 
+    def keep_log(self, host: Host) -> Path:
+        """Return the log of the actor on a host, kept with the run's own when its folder goes."""
+        found = until(lambda: list((self.folder / host.name).glob("riposte-actor-*/logs/*.jsonl")))
+        kept = self.run / "logs" / found[0].name
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        os.link(found[0], kept)
+        return kept
+
+    def pace(self) -> "Pace":
+        """Return an onlooker that measures the learner's rate."""
+        return Pace(self)
+
     def said(self, host: Host) -> str:
         """Return what the commands on a host have printed."""
         path = self.folder / f"{host.name}.out"
         return path.read_text() if path.exists() else ""
+
+
+class Pace:
+    """An operator who looks at how fast the run goes, by what the league says."""
+
+    def __init__(self, cluster: Cluster) -> None:
+        cfg = BusConfig(connect=(cluster.endpoint,), certificates=str(cluster.certificates))
+        self.bus = open_zenoh(cfg, "pace", SystemClock(), "run", "operator")
+        self._progress = self.bus.subscribe(PROGRESS)
+        self._samples = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.bus.close()
+
+    def measure(self, seconds: float) -> float:
+        """Return the samples a second that the learner takes in meanwhile."""
+        self.rest(1.5, self)
+        before, began = self._samples, time.monotonic()
+        self.rest(seconds, self)
+        return (self._samples - before) / (time.monotonic() - began)
+
+    def until_acknowledged(self, log: Path) -> None:
+        """Wait until an actor has had a rollout acknowledged."""
+        until(lambda: '"rollout_acknowledged"' in log.read_text())
+
+    def listen(self, timeout: float) -> None:
+        self.bus.wait(timeout)
+        while (progress := self._progress.take()) is not None:
+            self._samples = progress.total_samples
+
+    @staticmethod
+    def rest(seconds: float, pace: "Pace | None" = None) -> None:
+        """Let time pass, listening."""
+        deadline = time.monotonic() + seconds
+        while (left := deadline - time.monotonic()) > 0:
+            if pace is None:
+                time.sleep(left)
+            else:
+                pace.listen(min(left, 0.2))
+
+
+class Throttle:
+    """Lets a process run for a share of every 200 ms: a slower processor."""
+
+    PERIOD = 0.2
+
+    def __init__(self, process: "subprocess.Popen[bytes]", share: float) -> None:
+        self._process = process
+        self._on = share * self.PERIOD
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+        self._process.send_signal(signal.SIGCONT)
+
+    def _run(self) -> None:
+        while not self._over.wait(self._on):
+            self._process.send_signal(signal.SIGSTOP)
+            self._over.wait(self.PERIOD - self._on)
+            self._process.send_signal(signal.SIGCONT)
 
 
 def until(condition: Callable[[], Any], seconds: float = 90.0) -> Any:
