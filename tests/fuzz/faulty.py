@@ -1,5 +1,6 @@
 """Readers that break every promise, so that the campaign can be seen to notice."""
 
+import contextlib
 import os
 import pickle  # noqa: TID251 - the point of this reader
 import time
@@ -42,9 +43,12 @@ def acted(_: Path) -> list[Target]:
     return _target("acted", lambda: pickle.loads(PICKLED))
 
 
-def wrote(folder: Path) -> list[Target]:
-    outside = folder.parent / "outside"
-    return _target("wrote", lambda: outside.write_bytes(b""))
+def wrote(_: Path) -> list[Target]:
+    def write() -> None:
+        with contextlib.suppress(OSError):  # there is no such folder; the attempt is enough
+            Path("/no/such/folder").write_bytes(b"")
+
+    return _target("wrote", write)
 
 
 def crashed(_: Path) -> list[Target]:

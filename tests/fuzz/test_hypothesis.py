@@ -16,6 +16,7 @@ TARGETS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(120)
 @given(random=st.randoms(use_true_random=False), target=st.sampled_from(TARGETS))
 @settings(max_examples=300, deadline=None, suppress_health_check=list(HealthCheck))

@@ -17,6 +17,7 @@ from tests.fuzz.entrances import wire
 from tests.fuzz.registry import GROUPS, NO_ENTRANCES, targets_of
 from tests.fuzz.target import Target
 
+pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 READERS = frozenset({
     "msgspec.json.decode", "msgspec.msgpack.decode", "msgspec.toml.decode", "toml.parse",
