@@ -57,7 +57,9 @@ class Locked:
         config["connect"]["timeout_ms"] = 2000
         return json.dumps(config)
 
-    def issue(self, name: str, folder: Path) -> dict[str, str]:
+    def issue(
+        self, name: str, folder: Path, now: datetime.datetime = NOW, days: int = 30
+    ) -> dict[str, str]:
         """Return files of a certificate of the site's authority for any common name."""
         from cryptography import x509
 
@@ -66,7 +68,7 @@ class Locked:
             read_key(private.read_bytes()),
             x509.load_pem_x509_certificate((self.certificates / "ca.crt").read_bytes()),
         )
-        pair = issue(authority, name, (), NOW, 30)
+        pair = issue(authority, name, (), now, days)
         certificate, key = folder / f"{name}.crt", folder / f"{name}.key"
         certificate.write_bytes(certificate_pem(pair.certificate))
         key.write_bytes(key_pem(pair.key))

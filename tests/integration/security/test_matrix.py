@@ -16,12 +16,12 @@ from tests.integration.security.locked import ROOT, Locked
 pytestmark = pytest.mark.zenoh
 
 
-def probed(site: Locked, roles: Iterable[str]) -> set[tuple[str, str, str]]:
+def probed(endpoint: str, certificates: Path, roles: Iterable[str]) -> set[tuple[str, str, str]]:
     """Return what got through."""
     done = subprocess.run(
         [
             sys.executable, str(Path(__file__).with_name("prober.py")),
-            site.endpoint, str(site.certificates), *roles,
+            endpoint, str(certificates), *roles,
         ],
         cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
         timeout=100,
@@ -30,9 +30,13 @@ def probed(site: Locked, roles: Iterable[str]) -> set[tuple[str, str, str]]:
     return {tuple(found) for found in json.loads(done.stdout)}
 
 
+def expected(roles: Iterable[Role]) -> set[tuple[str, str, str]]:
+    """Return what should."""
+    return set[tuple[str, str, str]]().union(*map(allowed, roles))
+
+
 def check(site: Locked, roles: tuple[Role, ...]) -> None:
-    got = probed(site, roles)
-    want = set[tuple[str, str, str]]().union(*map(allowed, roles))
+    got, want = probed(site.endpoint, site.certificates, roles), expected(roles)
     assert sorted(got - want) == []
     assert sorted(want - got) == []
     for role in roles:
