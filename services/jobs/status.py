@@ -155,7 +155,7 @@ def _watch(call: RollCall) -> int:
     console = _console()
     with (
         stop_on_signals() as stop,
-        Live(console=console, auto_refresh=False, vertical_overflow="visible") as live,
+        Live(console=console, auto_refresh=False) as live,
     ):
         while not stop.is_set():
             call.listen(WATCH_SECONDS)

@@ -40,7 +40,9 @@ def test_an_actor_of_another_host_is_seen_by_status_and_leaves_when_told(cluster
     actor = cluster.join(desk)
     log = cluster.keep_log(desk)
     until(lambda: '"service_started"' in log.read_text())
-    seen = {(one["host"], one["name"]): one for one in cluster.status()["services"]}
+    seen = {
+        (one["host"], one["name"]): one for one in cluster.status("--run-id", "run")["services"]
+    }
     assert seen.keys() == {("learner", "league-0"), ("desk", log.stem)}
     assert seen["desk", log.stem]["waiting_for"].startswith("league: ")
     actor.terminate()
