@@ -219,7 +219,7 @@ def blocks(kept: dict[str, Any]) -> dict[str, str]:
         "conditions": conditions(kept),
         "coefficients": coefficients(cost),
         "sizes": sizes(cost),
-        "rates": rates(cost),
+        "rates": f"![What a site does with more and more actors]({FIGURE})\n\n{rates(cost)}",
         "checks": checks(found),
         "memory": memory(found),
         "crowding": crowding(found),
