@@ -4,9 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import loadmat
 
 from shared.identification.dataset.reading import read_dataset
+from shared.identification.fit import floor_from_base, polish
+from shared.identification.leftover import leftovers
 from shared.identification.problem import Problem
+from shared.identification.space import Space
 from studies.real_data import emps
 from tests.integration.identification.real.fitting import Fitted, fitted, problem_of
 
@@ -69,6 +73,29 @@ def test_friction_that_weakens_with_speed_says_nothing_beside_it(problem: Proble
     alone = fitted(problem, "coulomb_friction", "asymmetric_friction")
     bent = fitted(problem, "coulomb_friction", "asymmetric_friction", "nonlinear_viscous")
     assert bent.test == pytest.approx(alone.test, rel=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_pulses_that_the_commands_do_not_know_are_external_and_when_they_were(tmp_path: Path):
+    """Half the recording is pushed with 175.8 N, and friction is not in the model either."""
+    emps.convert(tmp_path / "hidden", RAW, "hidden")
+    guess = problem_of(tmp_path / "hidden")
+    noise = floor_from_base(Space(guess))
+    hidden = Problem(guess.subject, guess.dataset, guess.parameters, noise)
+    space = Space(hidden)
+    fit = polish(space, np.zeros(space.size), hidden.of("train"), 4)
+    found = leftovers(hidden, space.variant(fit.z), range(len(hidden.segments)))
+    pulses = np.asarray(loadmat(RAW / emps.FILES["pulses"])["pulses_N"], np.float64).ravel()
+    at = np.flatnonzero(np.diff(pulses, append=0.0)) * 1e-3
+    assert len(at) == 50
+    assert {(each.where, each.trajectory, each.phase, each.is_external) for each in found} == {
+        ("carriage", "pulses", "at times", True)
+    }
+    assert sorted(each.begin for each in found) == pytest.approx(at[0::2], abs=0.05)
+    assert sorted(each.end for each in found) == pytest.approx(at[1::2], abs=0.05)
+    torques = [each.torque for each in found]
+    assert torques == pytest.approx([175.8] * 25, rel=0.1)
 
 
 def test_the_pulses_are_volts_and_the_voltage_log_has_them(tmp_path: Path):
