@@ -140,14 +140,12 @@ class Campaign:
             exit_code=code,
             finished=job.finished,
             toll=job.books.toll,
-            names=job.books.size,
             unsafe=job.unsafe,
-            commands=job.commands,
             commit=commit(),
         )
         self._records.end(end)
         state = "finished" if end.finished else f"ENDED with exit code {code}"
-        self._say(f"{name} {state}, {end.names} acknowledged names compared, {end.toll}")
+        self._say(f"{name} {state}, {job.books.size} acknowledged names compared, {end.toll}")
 
     def _inject(self, job: Job, name: str, fault: Fault[Any], before: Toll) -> Injection | None:
         job.rest(float(self._chance.generator.uniform(*PAUSE)))
@@ -194,6 +192,8 @@ def injection_of(
         base=job.timeline.base,
         during=job.timeline.rate(blow.struck_at, blow.over_at) if lasted >= WINDOW else None,
         toll=toll,
+        names=job.books.size,
+        commands=job.commands,
         told=blow.told,
         refused=blow.refused,
         note=blow.note,

@@ -37,6 +37,10 @@ class Injection(msgspec.Struct, frozen=True, kw_only=True):
     during: float | None = None
     """Rate while it went on, where it lasts long enough to say."""
     toll: Toll = Toll()
+    names: int = 0
+    """Acknowledged names of the run that have been compared with its ledger by then."""
+    commands: int = 0
+    """Commands to the robot that have been checked by then."""
     unsafe: int = 0
     """Commands to the robot outside the gate's rules."""
     told: dict[str, int] = {}
@@ -60,11 +64,7 @@ class JobEnd(msgspec.Struct, frozen=True, kw_only=True):
     """Exit code 0 and a ledger that says that everything was done."""
     toll: Toll = Toll()
     """Over the whole run."""
-    names: int = 0
-    """Acknowledged names that were compared with the ledger."""
     unsafe: int = 0
-    commands: int = 0
-    """Commands to the robot that were checked."""
     commit: str = ""
 
 

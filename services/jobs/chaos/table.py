@@ -113,10 +113,12 @@ def rich_table(rows: Sequence[Row]) -> Table:
 def summary(injections: Sequence[Injection], jobs: Sequence[JobEnd]) -> str:
     """Return what all of it came to, in a sentence."""
     finished = sum(job.finished for job in jobs)
-    names, commands = (sum(getattr(job, name) for job in jobs) for name in ("names", "commands"))
+    last = {injection.job: injection for injection in injections}.values()
+    names, commands = sum(one.names for one in last), sum(one.commands for one in last)
     text = (
-        f"{len(injections)} faults in {len(jobs)} runs, {finished} of which finished; "
-        f"{names} acknowledged rollouts and results were compared with the ledgers, name by name"
+        f"{len(injections)} faults in {len(last)} runs; {finished} of the {len(jobs)} runs that "
+        f"were watched to their end finished; {names} acknowledged "
+        "rollouts and results were compared with the ledgers, name by name"
     )
     told, refused = (
         sum(sum(getattr(one, name).values()) for one in injections) for name in ("told", "refused")

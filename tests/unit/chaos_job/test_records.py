@@ -2,13 +2,14 @@
 
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from services.jobs.chaos.books import Toll
 from services.jobs.chaos.campaign import Plan
 from services.jobs.chaos.records import INJECTIONS, Injection, JobEnd, Records
 from services.jobs.chaos.sites import FAULTS, KINDS, ROBOT
-from services.jobs.chaos.table import BEGIN, END, markdown, rows_of, write_block
+from services.jobs.chaos.table import BEGIN, END, markdown, rows_of, summary, write_block
 from shared.errors import ConfigError
 
 KILLS = [FAULTS["kill-league"], FAULTS["kill-actor"]]
@@ -65,6 +66,19 @@ def test_a_row_adds_up_its_injections():
     (row,) = rows_of(KINDS, kept, ROBOT)
     assert (row.count, row.lost, row.never, row.median, row.worst) == (4, 2, 1, 2.0, 9.0)
     assert not row.is_harmless
+
+
+def test_a_summary_counts_runs_and_what_was_compared():
+    kept = [
+        msgspec.structs.replace(
+            injection("kill-league"), names=names, told={"x": 2}, refused={"x": 1}
+        )
+        for names in (10, 25)
+    ]
+    said = summary(kept, [JobEnd(job="training-0-x", seconds=1.0, exit_code=0, finished=True)])
+    assert said.startswith("2 faults in 1 runs; 1 of the 1 runs that were watched to their end")
+    assert "25 acknowledged rollouts" in said
+    assert "4 lies and damaged files were offered, 2 of them refused" in said
 
 
 def test_a_table_goes_between_its_marks_and_nowhere_else(tmp_path: Path):
