@@ -8,6 +8,8 @@ import functools
 from pathlib import Path
 from typing import Final, Literal, Protocol
 
+import msgspec
+
 from services.recorder.config import RecorderConfig
 from services.recorder.live import about_of
 from services.recorder.service import Recorder
@@ -28,7 +30,9 @@ from shared.sim.arena import bat_of, target_of
 from shared.sim.config import SimConfig
 from shared.sim.model import FencingModel
 
-BEGAN: Final = 1_700_000_000.0
+BEGAN: Final = 1000.0
+PAST: Final = 1e-4
+"""Ticks come so long after they are due, so that rounding makes none early (s)."""
 PARKED: Final = Path(__file__).resolve().parents[2] / "deploy" / "parked_bat.npy"
 """A bat that lies still, 3 m away."""
 RECORDER_TICKS: Final = 2
@@ -61,8 +65,7 @@ class VirtualSite:
         hub = MemoryHub(self.clock, max_messages=4096)
         self._hub = hub
         folder.mkdir(parents=True, exist_ok=True)
-        values = {name: getattr(robot, name) for name in robot.__struct_fields__}
-        cfg = RobotIoConfig(**{**values, "tracker": "replay", "replay": str(PARKED)})
+        cfg = msgspec.structs.replace(robot, tracker="replay", replay=str(PARKED))
         own = self._join("robot_io")
         parts = twin_parts(cfg, safety, sim, own)
         self.robot_io = RobotIo(cfg, parts, sim.control_timestep, own, self.clock)
@@ -78,6 +81,12 @@ class VirtualSite:
         )
         self._period = sim.control_timestep
         self._ticks = 0
+        self.clock.advance(PAST)
+
+    @property
+    def is_quiet(self) -> bool:
+        """Return whether it is time for a person to do something: once a second."""
+        return self._ticks % round(1.0 / self._period) == 0
 
     def join(self, name: str) -> Bus:
         """Return one more end of the bus."""
@@ -88,10 +97,9 @@ class VirtualSite:
         self.robot_io.tick()
         for each in people:
             each.tick()
-        self.clock.advance(0.3 * self._period)
-        self.robot_io.tick()
+        self.robot_io.tick()  # sends what was answered
         self.referee.tick()
-        self.clock.advance(0.5 * self._period)
+        self.clock.advance(0.8 * self._period)  # past its wait for an answer
         self.robot_io.tick()
         if self._ticks % RECORDER_TICKS == 0:
             self.recorder.tick()

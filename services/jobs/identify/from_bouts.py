@@ -8,6 +8,7 @@ last quarter of the bouts is held out; of a programme that was played, what it h
 import argparse
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,9 +20,10 @@ from services.robot_io.vive.calibration import Calibration, load_calibration
 from services.robot_io.vive.frames import composed
 from shared.errors import IdentificationError
 from shared.identification.dataset.logs import Log, Rows, data_set, rising
-from shared.identification.dataset.reading import read_dataset
+from shared.identification.dataset.reading import NANO, read_dataset
 from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource
 from shared.identification.dataset.writing import write_dataset
+from shared.identification.excitation.motions import PERIOD
 from shared.identification.excitation.reading import AT, PosePlan, read_programme
 from shared.messages.message import Array
 from shared.sim.config import SimConfig
@@ -33,6 +35,8 @@ from shared.telemetry.streams import TICK, TIME
 SHORTEST: Final = 2.0
 """Of a bout's commands and readings (s)."""
 ROBOT: Final = "protagonist"
+LOOKED_AT: Final = range(-20, 100)
+"""Ticks after a bout's start at which the motion of a programme may have begun."""
 STREAMS: Final = (streams.GATE.name, streams.ARMS.name, streams.BATS.name)
 
 
@@ -104,7 +108,7 @@ def of_bouts(
         if log is None:
             left_out.append(f"{bout.folder.name}: {why}")
             continue
-        logs.append(log)
+        logs.append(log if plan is None else _cut(log, bout, plan))
         arms.add(msgspec.convert(bout.info.sections.get("sim", {}), SimConfig).arms[1])
     if len(logs) < 2:
         reasons = f" ({'; '.join(left_out[:4])})" if left_out else ""
@@ -146,6 +150,26 @@ def _played(plan: PosePlan, bouts: Sequence[ArchivedBout]) -> list[tuple[Archive
             f"bouts: riposte robot play-programme {plan.folder} --only {' '.join(lost)}"
         )
     return [(whole[each.name], each.name) for each in plan.stretches]
+
+
+def _cut(log: Log, bout: ArchivedBout, plan: PosePlan) -> Log:
+    """Return a recording from where its motion began, so that repeats are of the same instants.
+
+    The bout says so only roughly (the way from the referee to the robot takes some ticks); the
+    commands that were sent say it to the tick.
+    """
+    poses = next(each.poses for each in plan.stretches if each.name == log.name)
+    tick = round(NANO * PERIOD)
+    command, gone = log.command, tick * np.arange(len(poses))
+
+    def off(ticks: int) -> float:
+        at = bout.info.started_at_ns + ticks * tick + gone
+        held = np.searchsorted(command.t_ns, at + tick // 2, side="right") - 1
+        sent = command.values[np.maximum(held, 0), :3]
+        return float(np.abs(sent - poses[:, :3]).mean())
+
+    began = bout.info.started_at_ns + tick * min(LOOKED_AT, key=off)
+    return replace(log.cut(began - tick // 2)[1], name=log.name)
 
 
 def _log(bout: ArchivedBout, gripper: Calibration | None, recording: str) -> tuple[Log | None, str]:
