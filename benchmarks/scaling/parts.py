@@ -9,7 +9,6 @@ from benchmarks.actor import Loop
 from benchmarks.harness import cpu_of
 from benchmarks.rollouts import rollout_of
 from services.learner.config import LearnerConfig
-from services.learner.ppo import PolicyOptimiser
 
 NUM_ENVS = 128
 BATCH = 4
@@ -22,6 +21,8 @@ def costs(rounds: int) -> dict[str, float]:
     Args:
         rounds: rollouts played, each followed by an update from the newest four.
     """
+    from services.learner.ppo import PolicyOptimiser  # torch: only where PPO runs
+
     before = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {min(before)})
     loop = Loop(NUM_ENVS, 1)
