@@ -18,7 +18,7 @@ from shared.clock import Clock, SystemClock
 from shared.errors import ConfigError, RiposteError
 from shared.messages.play import GateReply, GateRequest
 from shared.messages.topics import ARM
-from shared.runtime.serve import ServeArgs, open_site_bus, run_id_of
+from shared.runtime.serve import ServeArgs, certificates_override, open_site_bus, run_id_of
 
 Action = Literal["check", "arm", "disarm", "reset"]
 ABOUT = {
@@ -87,6 +87,7 @@ def place(found: argparse.Namespace) -> ServeArgs:
     if folder is None:
         folder = PLAYED if (PLAYED / "endpoint.json").exists() else UP
     connect, run_id = tuple(found.connect), str(found.run_id)
+    certificates = found.certificates
     goes_on = (folder / "endpoint.json").exists()
     if not connect and not goes_on and found.site is None:
         raise ConfigError(
@@ -96,6 +97,7 @@ def place(found: argparse.Namespace) -> ServeArgs:
     if not connect and goes_on:
         endpoint = read_endpoint(folder)
         connect, run_id = (endpoint.connect,), run_id or endpoint.run
+        certificates = certificates or endpoint.certificates
     return ServeArgs(
         role="robot",
         site=found.site,
@@ -103,7 +105,10 @@ def place(found: argparse.Namespace) -> ServeArgs:
         run=folder,
         run_id=run_id or run_id_of(folder),
         connect=connect,
-        overrides=(f"bus.open_seconds={OPEN_SECONDS}",),
+        overrides=(
+            f"bus.open_seconds={OPEN_SECONDS}",
+            *certificates_override(certificates),
+        ),
     )
 
 
