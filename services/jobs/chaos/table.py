@@ -103,7 +103,8 @@ def rich_table(rows: Sequence[Row]) -> Table:
     """Return the table for a terminal."""
     table = Table(box=None, padding=(0, 1))
     for name in (HEAD[0], *HEAD[3:]):
-        table.add_column(name, justify="left" if name == HEAD[0] else "right")
+        is_name = name == HEAD[0]
+        table.add_column(name, justify="left" if is_name else "right", no_wrap=is_name)
     for row in rows:
         cells = row.cells
         table.add_row(cells[0], *cells[3:], style="" if row.is_harmless else "bold red")
