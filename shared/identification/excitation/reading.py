@@ -8,6 +8,7 @@ from typing import Final, Literal
 import msgspec
 import numpy as np
 
+from shared.config import toml
 from shared.errors import IdentificationError
 from shared.identification.dataset import checks
 from shared.identification.dataset.manifest import FILE, read_manifest
@@ -132,8 +133,8 @@ def _bytes(path: Path) -> bytes:
 
 def _told(path: Path) -> _File:
     try:
-        told = msgspec.toml.decode(_bytes(path), type=_File)
-    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        told = toml.decode(_bytes(path), _File)
+    except ValueError as error:
         raise IdentificationError(
             f"{path}: {error}; design the programme again with riposte identify excite"
         ) from None

@@ -100,7 +100,7 @@ def _ros_connections() -> list[Target]:
     return [
         Target("robot/ros/header", wire.fields_of, (greeting[4:],), _lengths, (MessageError,),
                ("shared.ros.wire:fields_of", "shared.ros.wire:length_of"), SMALL),
-        Target("robot/ros/stream", _stream, (greeting + wire.framed(bytes(40)) * 3,), _lengths,
+        Target("robot/ros/stream", _stream, (greeting + wire.framed(bytes(16)) * 3,), _lengths,
                (MessageError,), ("shared.ros.subscribing:_Reader.data_received",), LARGE),
         Target("robot/ros/xml", server._answer, xml, mutate.raw, (MessageError,),
                ("shared.ros.xmlrpc:_decoded",), Bound(256, 16 * MIB)),

@@ -28,6 +28,7 @@ from shared.config.site import dump, load_section
 from shared.errors import ConfigError, IdentificationError, SnapshotError
 from shared.identification import saved
 from shared.identification.dataset.manifest import read_manifest
+from shared.identification.excitation import reading
 from shared.identification.hidden.truth import Truth, read_truth
 from shared.sim.parameters import dump_parameters, load_parameters
 from shared.styles.bundle import Bundle, BundlePlayer, load_bundle
@@ -37,6 +38,14 @@ from tests.fuzz.target import Target, from_file
 from tests.unit.policy.making import snapshot
 
 VARIANTS = 3
+PROGRAMME = b"""schema = 1
+
+[[recording]]
+name = "sines"
+sha256 = "0f"
+lead_m = 0.02
+lead_rad = 0.1
+"""
 MANIFEST = b"""schema = 1
 control = "pose"
 continuous = ["wrist_roll"]
@@ -82,7 +91,7 @@ def _override() -> Target:
     return Target(
         name="sections/--set",
         read=read,
-        samples=(b"sim.num_envs=8", b'sim.arms=["right", "left"]', b"sim.half_distance = 1.25"),
+        samples=(b"sim.target_radius=0.25", b'sim.arms=["right", "left"]', b"sim.half_distance = 1.25"),
         mutate=formats.line,
         refusals=(ConfigError,),
         covers=("shared.config.site:_toml_value",),
@@ -97,6 +106,7 @@ def files(folder: Path) -> list[Target]:
 def _toml(folder: Path) -> list[Target]:
     calibration, truth = folder / "calibration.toml", folder / "truth.toml"
     model, bundle = folder / "model.toml", folder / "bundle" / "bundle.toml"
+    programme = folder / "programme.toml"
     manifest = functools.partial(read_manifest, Path("dataset.toml"))
     plain = load_parameters("nominal")
     rows: list[tuple[str, Callable[[bytes], object], tuple[bytes, ...], type[Exception], str]] = [
@@ -109,6 +119,8 @@ def _toml(folder: Path) -> list[Target]:
         ("truth.toml", from_file(truth, functools.partial(read_truth, folder)),
          tuple(_toml_of(seed, Truth) for seed in range(VARIANTS)),
          IdentificationError, "shared.identification.hidden.truth:read_truth"),
+        ("programme.toml", from_file(programme, functools.partial(reading._told, programme)),
+         (PROGRAMME,), IdentificationError, "shared.identification.excitation.reading:_told"),
         ("dataset.toml", manifest, (MANIFEST,), IdentificationError,
          "shared.identification.dataset.manifest:_parse"),
         ("bundle.toml", from_file(bundle, functools.partial(load_bundle, bundle.parent)),
