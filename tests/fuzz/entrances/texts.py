@@ -91,7 +91,11 @@ def _override() -> Target:
     return Target(
         name="sections/--set",
         read=read,
-        samples=(b"sim.target_radius=0.25", b'sim.arms=["right", "left"]', b"sim.half_distance = 1.25"),
+        samples=(
+            b"sim.target_radius=0.25",
+            b'sim.arms=["right", "left"]',
+            b"sim.half_distance = 1.25",
+        ),
         mutate=formats.line,
         refusals=(ConfigError,),
         covers=("shared.config.site:_toml_value",),
