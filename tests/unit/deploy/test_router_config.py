@@ -7,7 +7,7 @@ import zenoh
 
 from tests.unit.deploy.found import DEPLOY, pods
 
-CONFIG = DEPLOY / "zenoh/router.json5"
+CONFIG = DEPLOY / "zenoh/zenohd.json5"
 
 
 @pytest.fixture
