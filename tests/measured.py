@@ -36,11 +36,11 @@ def nothing(row: Row) -> None:
 
 def measure(
     folder: Path, rng: np.random.Generator, enter: Enter = nothing, structure: Structure = (),
-    seconds: float = 8.0,
+    seconds: float = 8.0, again_from: Float64 | None = None,
 ) -> Dataset:  # fmt: skip
     """Return three recordings of an arm with something in it; the last repeats the first.
 
-    Their names are ``first``, ``second`` (held out) and ``again``.
+    Their names are ``first``, ``second`` (held out) and ``again``, which may start elsewhere.
     """
     at = np.arange(0.0, seconds, 0.01)
     empty = Trajectory(
@@ -57,7 +57,12 @@ def measure(
         trajectories=(
             empty,
             replace(empty, name="second", split="test", command=swings(seconds, 1.0)),
-            replace(empty, name="again", repeats="first"),
+            replace(
+                empty,
+                name="again",
+                repeats="first",
+                initial_q=np.zeros(3) if again_from is None else again_from,
+            ),
         ),
         caveats=(),
         hash="",
@@ -79,7 +84,7 @@ def measure(
 def problem_of(dataset: Dataset) -> Problem:
     """Return the data against the nominal arm."""
     subject = subject_of(dataset)
-    return Problem(subject, dataset, base_parameters(subject), noise_of(dataset, BLOCK))
+    return Problem(subject, dataset, base_parameters(subject), noise_of(dataset, BLOCK, {}))
 
 
 def nominal(problem: Problem) -> Variant:

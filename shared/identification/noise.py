@@ -11,6 +11,7 @@ import numpy as np
 
 from shared.identification.dataset.types import Dataset, Float64, Trajectory
 from shared.identification.smoothing import smooth
+from shared.identification.starts import Starts
 from shared.sim.plant.signals import pose_error, sampled, sampled_poses
 
 _BAND = 25
@@ -37,14 +38,15 @@ class Noise:
     """Whether repeats were there; else only what is faster than the arm was seen."""
 
 
-def noise_of(dataset: Dataset, block: float) -> Noise:
+def noise_of(dataset: Dataset, block: float, starts: Starts) -> Noise:
     """Return the noise floor of a data set.
 
     Args:
         dataset: the recordings; those with ``repeats`` are compared with what they repeat.
         block: what residuals are averaged over (s).
+        starts: what repeats differ by for starting elsewhere.
     """
-    joints, tracker = repeat_differences(dataset, block)
+    joints, tracker = repeat_differences(dataset, block, starts)
     pairs = len(joints)
     if pairs:
         scale = np.sqrt(0.5)
@@ -68,38 +70,47 @@ def noise_of(dataset: Dataset, block: float) -> Noise:
     return Noise(of_joints, of_tracker, correlation, is_measured=bool(pairs))
 
 
-def repeat_differences(dataset: Dataset, block: float) -> tuple[list[Float64], list[Float64]]:
+def repeat_differences(
+    dataset: Dataset, block: float, starts: Starts
+) -> tuple[list[Float64], list[Float64]]:
     """Return what repeats differ by, as block means: float64[B, J] and float64[B, 6] each.
 
-    Both are empty without repeats. The variance of a difference is twice that of the noise.
+    Both are empty without repeats. The variance of a difference is twice that of the noise. What
+    follows from where they started is taken off.
     """
     by_name = {each.name: each for each in dataset.trajectories}
     pairs = [(by_name[each.repeats], each) for each in dataset.trajectories if each.repeats]
     joints = [
-        block_means(first.joints_at, _against(first, second), block) for first, second in pairs
+        block_means(first.joints_at, _against(first, second, starts), block)
+        for first, second in pairs
     ]
     tracker = [
-        block_means(first.tracker_at, _tracker_against(first, second), block)
+        block_means(first.tracker_at, _tracker_against(first, second, starts), block)
         for first, second in pairs
         if first.tracker_at is not None and second.tracker_at is not None
     ]
     return joints, tracker
 
 
-def _against(first: Trajectory, second: Trajectory) -> Float64:
+def _against(first: Trajectory, second: Trajectory, starts: Starts) -> Float64:
     at = first.joints_at
     inside = at <= second.joints_at[-1]
     out = first.q - sampled(second.joints_at, second.q, at)
+    if (apart := starts.get(second.name)) is not None:
+        out = out - apart.joints
     return out[inside] if inside.sum() > _FEWEST else out
 
 
-def _tracker_against(first: Trajectory, second: Trajectory) -> Float64:
+def _tracker_against(first: Trajectory, second: Trajectory, starts: Starts) -> Float64:
     assert first.tracker_at is not None
     assert first.tracker is not None
     assert second.tracker_at is not None
     assert second.tracker is not None
     other = sampled_poses(second.tracker_at, second.tracker, first.tracker_at)
     out = pose_error(first.tracker, other)
+    apart = starts.get(second.name)
+    if apart is not None and apart.tracker is not None:
+        out = out - apart.tracker
     inside = first.tracker_at <= second.tracker_at[-1]
     return out[inside] if inside.sum() > _FEWEST else out
 

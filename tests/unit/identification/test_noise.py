@@ -42,7 +42,7 @@ def test_the_floor_of_correlated_noise_is_found_from_one_repeat(
 ):
     rng = np.random.default_rng(3)
     first, second = (0.01 * autoregressive(rng, correlation, 100) for _ in range(2))
-    found = noise_of(repeated(first, second), 0.02)
+    found = noise_of(repeated(first, second), 0.02, {})
     assert found.is_measured
     assert np.sqrt(np.mean(found.joints**2)) == pytest.approx(0.01, rel=tolerance)
     # Leaving out the noisiest stretches leaves out some of what correlates most.
@@ -53,7 +53,7 @@ def test_a_stretch_in_which_repeats_part_company_does_not_raise_the_floor():
     rng = np.random.default_rng(4)
     first, second = (autoregressive(rng, 0.0, 50) for _ in range(2))
     second[100:125] += 20.0 * np.sin(np.linspace(0.0, np.pi, 25))[:, None]
-    found = noise_of(repeated(first, second), 0.02)
+    found = noise_of(repeated(first, second), 0.02, {})
     assert np.sqrt(np.mean(found.joints**2)) == pytest.approx(1.0, rel=0.05)
     assert found.correlation.mean() < 0.1
 
@@ -69,7 +69,7 @@ def test_a_repeat_that_ends_early_is_compared_as_far_as_it_goes():
         replace(again, joints_at=AT[:200], q=again.q[:200],
                 tracker_at=AT[:200], tracker=others[:200]),
     )  # fmt: skip
-    found = noise_of(replace(dataset, trajectories=pair), 0.02)
+    found = noise_of(replace(dataset, trajectories=pair), 0.02, {})
     assert found.tracker is not None
     assert np.sqrt(np.mean(found.joints**2)) == pytest.approx(0.001, rel=0.05)
     assert np.sqrt(np.mean(found.tracker[:3] ** 2)) == pytest.approx(0.001, rel=0.1)
@@ -77,7 +77,7 @@ def test_a_repeat_that_ends_early_is_compared_as_far_as_it_goes():
 
 def test_without_repeats_what_is_faster_than_the_arm_is_the_noise():
     noise = 0.001 * autoregressive(np.random.default_rng(6), 0.0, 50)
-    found = noise_of(repeated(noise, None), 0.02)
+    found = noise_of(repeated(noise, None), 0.02, {})
     assert not found.is_measured
     assert np.sqrt(np.mean(found.joints**2)) == pytest.approx(0.001, rel=0.1)
 

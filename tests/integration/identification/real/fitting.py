@@ -30,7 +30,7 @@ class Fitted:
 def problem_of(folder: Path) -> Problem:
     dataset = read_dataset(folder)
     subject = subject_of(dataset)
-    return Problem(subject, dataset, base_parameters(subject), noise_of(dataset, BLOCK))
+    return Problem(subject, dataset, base_parameters(subject), noise_of(dataset, BLOCK, {}))
 
 
 def fitted(problem: Problem, *names: str, steps: int = 6) -> Fitted:

@@ -89,7 +89,7 @@ def test_what_is_predicted_is_what_recordings_with_noise_then_say(
     programme: Programme, predicted: Prediction, quiet: Noise
 ):
     recorded = noisy(programme.predicted, quiet, 3)
-    found = ratios(predict(recorded, noise_of(recorded, BLOCK), EFFECTS))
+    found = ratios(predict(recorded, noise_of(recorded, BLOCK, {}), EFFECTS))
     for label, ratio in ratios(predicted).items():
         if ratio > VISIBLE:
             assert found[label] == pytest.approx(ratio, rel=0.2), label

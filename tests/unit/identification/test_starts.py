@@ -1,0 +1,56 @@
+"""Repeats that start in another state than what they repeat."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shared.identification.dataset.types import Dataset
+from shared.identification.noise import noise_of, repeat_differences
+from shared.identification.problem import BLOCK
+from shared.identification.starts import starts_apart
+from shared.identification.subject import subject_of
+from tests.measured import JOINT_NOISE, TRACKER_NOISE, measure
+
+
+@pytest.fixture(scope="module")
+def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    """A repeat that starts up to 0.3 rad from what it repeats; no reading knows it to 1e-4."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    return measure(
+        folder, np.random.default_rng(0), seconds=2.0, again_from=np.array([0.3, -0.2, 0.1])
+    )
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def test_what_follows_from_the_start_is_not_noise(elsewhere: Dataset):
+    starts = starts_apart(elsewhere, subject_of(elsewhere))
+    (raw,), (raw_tracker,) = repeat_differences(elsewhere, BLOCK, {})
+    (joints,), (tracker,) = repeat_differences(elsewhere, BLOCK, starts)
+    # two recordings, two readings a block: the noise of a reading
+    assert rms(joints) == pytest.approx(JOINT_NOISE, rel=0.1)
+    assert rms(raw) > 50.0 * JOINT_NOISE
+    assert rms(tracker[:, :3]) == pytest.approx(TRACKER_NOISE, rel=0.15)
+    assert rms(raw_tracker[:, :3]) > 5.0 * TRACKER_NOISE
+
+
+def test_repeats_that_start_alike_are_not_corrected(tmp_path: Path):
+    alike = measure(tmp_path, np.random.default_rng(0), seconds=1.0)
+    assert starts_apart(alike, subject_of(alike)) == {}
+
+
+def test_the_floor_of_a_data_set_is_that_of_its_readings(elsewhere: Dataset):
+    found = noise_of(elsewhere, BLOCK, starts_apart(elsewhere, subject_of(elsewhere)))
+    assert found.is_measured
+    assert found.joints == pytest.approx(np.full(3, JOINT_NOISE / np.sqrt(2.0)), rel=0.2)
+
+
+def test_an_arm_that_nothing_holds_is_not_corrected(elsewhere: Dataset):
+    torque = replace(elsewhere, control="torque", actuators=elsewhere.actuators)
+    subject = subject_of(torque)
+    assert subject.control == "torque"
+    assert starts_apart(torque, subject) == {}
