@@ -128,7 +128,7 @@ def _held_out(found: Search) -> HeldOut:
         base_fit=float(np.sqrt(base)),
         extended=float(np.sqrt(found.current_losses.mean())),
         noise_floor=float(np.sqrt(floor_of(base))),
-        share_removed=min(gain.share(base), 1.0) if found.accepted else 0.0,
+        share_removed=gain.share(base) if found.accepted else 0.0,
         share_interval=Interval(low=low, high=high)
         if found.accepted
         else Interval(low=0.0, high=0.0),

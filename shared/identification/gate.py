@@ -54,13 +54,17 @@ class Gain:
         return self.before - self.loss
 
     def share(self, base: float) -> float:
-        """Return it as a share of what is explainable: float base is the base fit's loss."""
-        return self.gain / (base - floor_of(base))
+        """Return it as a share of what is explainable, at most all of it.
+
+        Args:
+            base: the base fit's loss.
+        """
+        return min(self.gain / (base - floor_of(base)), 1.0)
 
     def share_interval(self, base: float) -> tuple[float, float]:
         """Return the 95 % interval of :meth:`share`."""
         explainable = base - floor_of(base)
-        return self.low / explainable, self.high / explainable
+        return min(self.low / explainable, 1.0), min(self.high / explainable, 1.0)
 
     def is_useful(self, base: float) -> bool:
         """Return whether it passes: surely better, and by enough."""
