@@ -28,6 +28,9 @@ from shared.telemetry.door import read_live_view
 
 log = structlog.get_logger()
 
+PATIENCE = 3600.0
+"""How long the parent goes without a router (s): it is the one who starts it again, and who says
+when that is in vain."""
 POLL_SECONDS = 0.1
 LEAST_FREE_BYTES = 4 << 20
 """With less than this a run ends, while there is room for a last word."""
@@ -93,7 +96,7 @@ def run_processes(
     try:
         started = supervisor.start()
         wait_for_router(endpoint, supervisor, stop)
-        bus_cfg = msgspec.structs.replace(cfg, connect=(endpoint,))
+        bus_cfg = msgspec.structs.replace(cfg, connect=(endpoint,), give_up_seconds=PATIENCE)
         with (
             contextlib.closing(open_zenoh(bus_cfg, job, clock, run)) as bus,
             display(bus, clock) as shown,
