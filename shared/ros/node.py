@@ -244,7 +244,7 @@ class Node:
         with contextlib.suppress(RosError):
             self._wait(self._registration.leave(), MASTER_SECONDS, "signing off")
         with contextlib.suppress(RosError):
-            self._wait(self._shut(), 1.0, "closing the node's sockets")
+            self._wait(self._shut(), 2.0, "closing the node's sockets")
         self._loop.close()
 
     def __enter__(self) -> "Node":
