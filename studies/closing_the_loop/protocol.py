@@ -35,11 +35,11 @@ class Protocol:
     seeds: tuple[int, ...] = (1, 2, 3)
     updates: tuple[int, int] = (100, 160)
     """Most PPO updates of the antagonist, then of the protagonist."""
-    iterations: int = 2
+    iterations: int = 1
     """Of phase one."""
     train: tuple[str, ...] = ()
     """More settings of `riposte train`."""
-    bouts: int = 64
+    bouts: int = 32
     """Of each protagonist against each antagonist."""
     bout_steps: int = 2000
     only: tuple[str, ...] = ()
