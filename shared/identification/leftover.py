@@ -25,7 +25,6 @@ from shared.identification.places import moving, place_of
 from shared.identification.problem import BLOCK, Problem, Variant
 from shared.identification.pushes import Push, is_one_way, pushes_of
 from shared.identification.scan import Width, merged, scan, stretches, width_of
-from shared.identification.starts import starts_apart
 from shared.identification.tracks import Track, missing_of, tracks_of
 from shared.identification.verdict import Unexplained
 from shared.sim.plant.kinematics import tool_poses
@@ -108,9 +107,7 @@ class _Missing:
 def _widths(problem: Problem) -> tuple[Width, Width | None]:
     """Return how wide the noise of joints and tracker is, by what repeats differ."""
     noise, count = problem.noise, len(problem.noise.joints)
-    joints, tracker = repeat_differences(
-        problem.dataset, BLOCK, starts_apart(problem.dataset, problem.subject)
-    )
+    joints, tracker = repeat_differences(problem.dataset, BLOCK, problem.subject.starts)
     of_joints = width_of(
         [each * np.sqrt(0.5) / noise.joints for each in joints],
         noise.correlation[:count],

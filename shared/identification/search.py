@@ -24,7 +24,6 @@ from shared.identification.progress import Progress
 from shared.identification.refit import Rough, refit, settle
 from shared.identification.screen import Screened, candidates_of, screen
 from shared.identification.space import Space
-from shared.identification.starts import starts_apart
 from shared.identification.subject import subject_of
 
 MOST_CAUSES = 4
@@ -130,7 +129,7 @@ def begin(
     rng = np.random.default_rng(seed)  # of the base fit, which may have been done before
     progress("noise floor", 0.0)
     subject = subject_of(dataset)
-    noise = noise_of(dataset, BLOCK, starts_apart(dataset, subject))
+    noise = noise_of(dataset, BLOCK, subject.starts)
     released = known = base_parameters(subject)
     if fits is not None and not {each.name for each in known} >= set(fits.names):
         fits = None

@@ -5,13 +5,13 @@ posture, to the start of its repeat in another, and is in another all the way. T
 noise, and the nominal model knows most of it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shared.identification.dataset.types import Dataset, Float64
-from shared.identification.subject import Subject, recorded_of
+from shared.identification.dataset.types import Float64, Trajectory
+from shared.sim.plant.rollouts import Recorded, Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import pose_error
 
@@ -33,25 +33,23 @@ Starts = Mapping[str, Apart]
 """By the name of the repeat; those that start alike are left out."""
 
 
-def starts_apart(dataset: Dataset, subject: Subject) -> Starts:
+def starts_apart(nominal: Rollouts, recorded: Sequence[tuple[Trajectory, Recorded]]) -> Starts:
     """Return what repeats differ by in the nominal model for starting elsewhere.
 
-    Under torque control nothing is returned: an arm that nothing holds drifts off, in a model, too.
+    Args:
+        nominal: the arm as its model file has it.
+        recorded: every recording, and what it is replayed from.
     """
-    if subject.control == "torque":
-        return {}
-    found = dict(
-        zip((each.name for each in dataset.trajectories), recorded_of(dataset), strict=True)
-    )
+    found = {trajectory.name: replayed for trajectory, replayed in recorded}
     out: dict[str, Apart] = {}
-    for each in dataset.trajectories:
+    for each, second in recorded:
         if not each.repeats:
             continue
-        first, second = found[each.repeats], found[each.name]
+        first = found[each.repeats]
         if float(np.abs(first.initial_q - second.initial_q).max()) < LEAST:
             continue
         again = replace(second, joints_at=first.joints_at, tracker_at=first.tracker_at)
-        one, other = subject.nominal.run([(_as_it_is, first), (_as_it_is, again)])
+        one, other = nominal.run([(_as_it_is, first), (_as_it_is, again)])
         tracker = None
         if one.tracker is not None and other.tracker is not None:
             tracker = np.nan_to_num(pose_error(one.tracker, other.tracker))

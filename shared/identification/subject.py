@@ -1,6 +1,7 @@
 """What is being identified: one arm, how it is driven, and what its recordings reach."""
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSou
 from shared.identification.motion import motion_of
 from shared.identification.ripples import ripples_of
 from shared.identification.slips import slip_of
+from shared.identification.starts import Starts, starts_apart
 from shared.sim.plant.inverse import inverse_dynamics
 from shared.sim.plant.plant import Control, Plant, is_weightless, mjcf, pr2
 from shared.sim.plant.rollouts import Recorded, Rollouts
@@ -58,6 +60,17 @@ class Subject:
             if each.split == "train"
         }
         return {name: at for name, at in found.items() if at is not None}
+
+    @functools.cached_property
+    def starts(self) -> Starts:
+        """Return what repeats differ by for starting elsewhere than what they repeat.
+
+        Nothing under torque control: an arm that nothing holds drifts off, in a model, too.
+        """
+        if self.control == "torque":
+            return {}
+        replayed = _replayed(self.recordings)
+        return starts_apart(self.nominal, list(zip(self.recordings, replayed, strict=True)))
 
     @property
     def control(self) -> Control:
@@ -123,6 +136,10 @@ def subject_of(dataset: Dataset, capacity: int = 128) -> Subject:
 
 def recorded_of(dataset: Dataset) -> tuple[Recorded, ...]:
     """Return what each trajectory is replayed from."""
+    return _replayed(dataset.trajectories)
+
+
+def _replayed(recordings: Sequence[Trajectory]) -> tuple[Recorded, ...]:
     return tuple(
         Recorded(
             initial_q=each.initial_q,
@@ -132,7 +149,7 @@ def recorded_of(dataset: Dataset) -> tuple[Recorded, ...]:
             joints_at=each.joints_at,
             tracker_at=each.tracker_at,
             trajectory=each.name,
-            earlier=tuple(other.name for other in dataset.trajectories[:index]),
+            earlier=tuple(other.name for other in recordings[:index]),
         )
-        for index, each in enumerate(dataset.trajectories)
+        for index, each in enumerate(recordings)
     )

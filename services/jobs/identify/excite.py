@@ -30,7 +30,6 @@ from shared.identification.excitation.programme import SHOWS, Programme, design
 from shared.identification.excitation.writing import write_programme
 from shared.identification.noise import noise_of
 from shared.identification.problem import BLOCK
-from shared.identification.starts import starts_apart
 from shared.identification.subject import subject_of
 from shared.sim.config import SimConfig
 from shared.sim.model import FencingModel
@@ -133,7 +132,7 @@ def _arm(arguments: argparse.Namespace) -> Arm:
 
 def _check(arguments: argparse.Namespace) -> int:
     dataset = read_dataset(arguments.check)
-    noise = noise_of(dataset, BLOCK, starts_apart(dataset, subject_of(dataset)))
+    noise = noise_of(dataset, BLOCK, subject_of(dataset).starts)
     prediction = predict(dataset, noise, effects())
     print(_json(prediction) if arguments.json else _text(prediction, None))
     if not noise.is_measured and not arguments.json:

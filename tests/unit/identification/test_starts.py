@@ -9,7 +9,6 @@ import pytest
 from shared.identification.dataset.types import Dataset
 from shared.identification.noise import noise_of, repeat_differences
 from shared.identification.problem import BLOCK
-from shared.identification.starts import starts_apart
 from shared.identification.subject import subject_of
 from tests.measured import JOINT_NOISE, TRACKER_NOISE, measure
 
@@ -28,7 +27,7 @@ def rms(values: np.ndarray) -> float:
 
 
 def test_what_follows_from_the_start_is_not_noise(elsewhere: Dataset):
-    starts = starts_apart(elsewhere, subject_of(elsewhere))
+    starts = subject_of(elsewhere).starts
     (raw,), (raw_tracker,) = repeat_differences(elsewhere, BLOCK, {})
     (joints,), (tracker,) = repeat_differences(elsewhere, BLOCK, starts)
     # two recordings, two readings a block: the noise of a reading
@@ -40,11 +39,11 @@ def test_what_follows_from_the_start_is_not_noise(elsewhere: Dataset):
 
 def test_repeats_that_start_alike_are_not_corrected(tmp_path: Path):
     alike = measure(tmp_path, np.random.default_rng(0), seconds=1.0)
-    assert starts_apart(alike, subject_of(alike)) == {}
+    assert subject_of(alike).starts == {}
 
 
 def test_the_floor_of_a_data_set_is_that_of_its_readings(elsewhere: Dataset):
-    found = noise_of(elsewhere, BLOCK, starts_apart(elsewhere, subject_of(elsewhere)))
+    found = noise_of(elsewhere, BLOCK, subject_of(elsewhere).starts)
     assert found.is_measured
     assert found.joints == pytest.approx(np.full(3, JOINT_NOISE / np.sqrt(2.0)), rel=0.2)
 
@@ -53,4 +52,4 @@ def test_an_arm_that_nothing_holds_is_not_corrected(elsewhere: Dataset):
     torque = replace(elsewhere, control="torque", actuators=elsewhere.actuators)
     subject = subject_of(torque)
     assert subject.control == "torque"
-    assert starts_apart(torque, subject) == {}
+    assert subject.starts == {}
