@@ -1,12 +1,13 @@
 """A bus that loses, repeats, delays and reorders, for tests; the same seed, the same faults."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from shared.bus.base import Bus, Inbox, NoAnswer, Pending, Refused, Subscription
+from shared.bus.base import Bus, NoAnswer, Pending, Refused
+from shared.bus.wrapped import WrappedBus
 from shared.clock import Clock
 from shared.messages.message import Message
 from shared.messages.topics import Service, Topic
@@ -34,27 +35,20 @@ class FaultPlan:
     """Seconds."""
 
 
-class FaultyBus:
+class FaultyBus(WrappedBus):
     """Wraps one process's bus and does wrong to what that process publishes and asks."""
 
     def __init__(self, bus: Bus, plan: FaultPlan, clock: Clock) -> None:
-        self.name = bus.name
-        self.boot = bus.boot
+        super().__init__(bus)
         self.faults: dict[str, int] = {
             "dropped": 0, "answers_dropped": 0, "duplicated": 0, "delayed": 0, "reordered": 0,
         }  # fmt: skip
         """How often each fault was committed."""
-        self._bus = bus
         self._plan = plan
         self._clock = clock
         self._rng = np.random.default_rng(plan.seed)
         self._later: list[tuple[float, Callable[[], None]]] = []
         self._after_next: list[Callable[[], None]] = []
-
-    @property
-    def counters(self) -> Mapping[str, int]:
-        """Return the wrapped bus's counts."""
-        return self._bus.counters
 
     def publish(self, topic: Topic[Out], message: Out, **fields: str) -> None:
         """Send a value, or not, or more than once, or later."""
@@ -64,14 +58,6 @@ class FaultyBus:
 
         if not self._strikes("drop", "dropped"):
             self._leave(send)
-
-    def subscribe(self, topic: Topic[Out], **fields: str) -> Subscription[Out]:
-        """Listen, undisturbed."""
-        return self._bus.subscribe(topic, **fields)
-
-    def answer(self, service: Service[In, Out], **fields: str) -> Inbox[In, Out]:
-        """Offer a service, undisturbed."""
-        return self._bus.answer(service, **fields)
 
     def ask(
         self, service: Service[In, Out], message: In, timeout: float, **fields: str
@@ -89,14 +75,6 @@ class FaultyBus:
             self._leave(send)
         return pending
 
-    def declare_alive(self, role: str) -> None:
-        """Let others see this process."""
-        self._bus.declare_alive(role)
-
-    def alive(self, role: str) -> frozenset[str]:
-        """Return who is alive."""
-        return self._bus.alive(role)
-
     def wait(self, timeout: float) -> bool:
         """Let go of what was held back long enough, then wait."""
         now = self._clock.now()
@@ -104,13 +82,13 @@ class FaultyBus:
         self._later = [(at, send) for at, send in self._later if at > now]
         for send in due:
             send()
-        return self._bus.wait(timeout)
+        return super().wait(timeout)
 
     def close(self) -> None:
         """Leave the bus; what was held back is lost."""
         self._later.clear()
         self._after_next.clear()
-        self._bus.close()
+        super().close()
 
     def _leave(self, send: Callable[[], None]) -> None:
         held, self._after_next = self._after_next, []

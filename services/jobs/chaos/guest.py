@@ -6,7 +6,7 @@ It joins a run as any actor does; the rest of the line is an actor's. CONDUCT is
 
 import dataclasses
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import msgspec
@@ -15,12 +15,13 @@ import structlog
 from services.actor.__main__ import build
 from services.jobs.chaos.lies import FORGED, FORGERIES, LIES, POLICY_LIE
 from shared.bus import endpoints
-from shared.bus.base import Bus, Inbox, Pending, Subscription
+from shared.bus.base import Bus, Pending
 from shared.bus.faults import FaultPlan, FaultyBus
+from shared.bus.wrapped import WrappedBus
 from shared.clock import Clock
 from shared.errors import ConfigError
 from shared.messages.message import Message
-from shared.messages.topics import POLICY, ROLLOUT, VERSION, Service, Topic
+from shared.messages.topics import POLICY, ROLLOUT, VERSION, Service
 from shared.messages.training import (
     AGENTS,
     PolicyAnnouncement,
@@ -41,13 +42,11 @@ NO_LIMIT = 1 << 31
 CONDUCTS = ("unreliable", "lying")
 
 
-class LyingBus:
+class LyingBus(WrappedBus):
     """Wraps an actor's bus: behind each rollout goes a lie, until all of them are told."""
 
     def __init__(self, bus: Bus) -> None:
-        self.name = bus.name
-        self.boot = bus.boot
-        self._bus = bus
+        super().__init__(bus)
         self._answers: list[tuple[str, str, Pending[Any]]] = []
         self._policies = [bus.subscribe(POLICY, agent=agent) for agent in AGENTS]
         self._forgery = ""
@@ -62,39 +61,14 @@ class LyingBus:
 
         endpoints.encode = written  # a liar's own program; nobody else's
 
-    @property
-    def counters(self) -> Mapping[str, int]:
-        """Return the wrapped bus's counts."""
-        return self._bus.counters
-
-    def publish(self, topic: Topic[Out], message: Out, **fields: str) -> None:
-        """Send a value."""
-        self._bus.publish(topic, message, **fields)
-
-    def subscribe(self, topic: Topic[Out], **fields: str) -> Subscription[Out]:
-        """Listen."""
-        return self._bus.subscribe(topic, **fields)
-
-    def answer(self, service: Service[In, Out], **fields: str) -> Inbox[In, Out]:
-        """Offer a service."""
-        return self._bus.answer(service, **fields)
-
     def ask(
         self, service: Service[In, Out], message: In, timeout: float, **fields: str
     ) -> Pending[Out]:
         """Send a request, and after a rollout the next lie."""
-        pending = self._bus.ask(service, message, timeout, **fields)
+        pending = super().ask(service, message, timeout, **fields)
         if isinstance(message, Rollout):
             self._tell(message)
         return pending
-
-    def declare_alive(self, role: str) -> None:
-        """Let others see this process."""
-        self._bus.declare_alive(role)
-
-    def alive(self, role: str) -> frozenset[str]:
-        """Return who is alive."""
-        return self._bus.alive(role)
 
     def wait(self, timeout: float) -> bool:
         """Note how lies were answered, then wait."""
@@ -111,11 +85,7 @@ class LyingBus:
         for subscription in self._policies:
             while (policy := subscription.take()) is not None:
                 self._corrupt(policy)
-        return self._bus.wait(timeout)
-
-    def close(self) -> None:
-        """Leave the bus."""
-        self._bus.close()
+        return super().wait(timeout)
 
     def _tell(self, rollout: Rollout) -> None:
         """Tell the next lie, made of a rollout; each is told once."""
