@@ -22,7 +22,8 @@ import tomli_w
 
 from shared.bus.base import Bus, NoAnswer, Refused
 from shared.bus.config import BusConfig
-from shared.bus.zenoh import hear_runs, open_zenoh
+from shared.bus.runs import find_run
+from shared.bus.zenoh import open_zenoh
 from shared.clock import Clock
 from shared.config import toml
 from shared.config.site import SECTIONS, raw_sections
@@ -155,14 +156,8 @@ def _find_run(cfg: BusConfig, name: str, clock: Clock, stop: threading.Event) ->
     where = ", ".join(cfg.routers)
     told = False
     while not stop.is_set():
-        runs = sorted(hear_runs(cfg, name, clock, "actor", SCHEDULE, LISTEN_SECONDS))
-        if len(runs) == 1:
-            return runs[0]
-        if runs:
-            raise ConfigError(
-                f"{len(runs)} runs are on at {where}: {', '.join(runs)}; "
-                f"choose one, as in --run-id {runs[0]}"
-            )
+        if run := find_run(cfg, name, clock, "actor", SCHEDULE, LISTEN_SECONDS):
+            return run
         if not told:
             told = True
             _say(f"{name}: no run is on at {where} yet; waits for one")

@@ -16,7 +16,7 @@ from rich.live import Live
 from services.jobs.roll_call import RollCall
 from services.jobs.status_view import Snapshot, render
 from shared.bus.config import BusConfig
-from shared.bus.zenoh import hear_runs
+from shared.bus.runs import find_run
 from shared.clock import Clock, SystemClock
 from shared.errors import ConfigError
 from shared.messages.topics import STATUS
@@ -179,13 +179,7 @@ def _only_run(args: ServeArgs, clock: Clock) -> str:
         ConfigError: several are.
     """
     cfg = args.section("bus", BusConfig).with_endpoints(connect=args.connect)
-    runs = sorted(hear_runs(cfg, args.name, clock, "operator", STATUS, LISTEN_SECONDS))
-    if len(runs) > 1:
-        raise ConfigError(
-            f"{len(runs)} runs are on at {', '.join(cfg.routers)}: {', '.join(runs)}; "
-            f"choose one, as in --run-id {runs[0]}"
-        )
-    return runs[0] if runs else args.run_id
+    return find_run(cfg, args.name, clock, "operator", STATUS, LISTEN_SECONDS) or args.run_id
 
 
 def add_bus_arguments(

@@ -8,7 +8,7 @@ import structlog
 from services.router.listening import LibraryLog
 from shared.bus.config import BusConfig
 from shared.bus.refusals import LOG_FILTER, Refusals, read_log
-from shared.bus.zenoh import Router, open_router
+from shared.bus.routing import Router, open_router
 
 LOOK_SECONDS = 1.0
 """Period of looking at what was refused; each session is in at most one line of each."""

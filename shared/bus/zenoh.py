@@ -19,7 +19,6 @@ The client reconnects by itself within half a second of a router's return, but n
 import contextlib
 import secrets
 import threading
-from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias, TypeVar
 
@@ -29,16 +28,15 @@ from zenoh.handlers import Callback
 
 from shared.bus.arrivals import take_answer, take_request, take_value
 from shared.bus.base import NoAnswer, Refused
-from shared.bus.config import BusConfig, client_json, router_json, warn_of_plain_network
+from shared.bus.config import BusConfig, client_json, warn_of_plain_network
 from shared.bus.counters import Counters
 from shared.bus.endpoints import Answer, Host, Present, Requests, Values, ask_of, too_long
 from shared.bus.keys import PREFIX, check_chunk, key_of, pattern_of
 from shared.bus.latest import LatestSent, stamp_of
-from shared.bus.peers import Peers
 from shared.bus.tls import check_files, files_of, why_refused
 from shared.bus.watchdog import Watchdog
 from shared.clock import Clock
-from shared.errors import BusError, ConfigError, MessageError
+from shared.errors import BusError, MessageError
 from shared.messages.message import Message
 from shared.messages.topics import Qos, Role, Service, Topic
 from shared.messages.wire import encode
@@ -87,7 +85,7 @@ def open_zenoh(
     told = False
     while True:
         try:
-            return ZenohBus(cfg, name, clock, run, _open(config), config)
+            return ZenohBus(cfg, name, clock, run, open_session(config), config)
         except zenoh.ZError as error:
             waited = clock.now() - began_at
             if waited > cfg.open_seconds:
@@ -107,69 +105,6 @@ def _no_session(cfg: BusConfig, role: Role) -> str:
         if said := "; ".join(f"{one}: {reason}" for one, reason in reasons if reason):
             return f"{where}: {said}"
     return f"{where}: start one with `riposte router`, or name another endpoint with --connect"
-
-
-class Router:
-    """A Zenoh router in this process."""
-
-    def __init__(self, session: zenoh.Session, endpoints: tuple[str, ...]) -> None:
-        self.endpoints = endpoints
-        self.peers = Peers()
-        self._session = session
-        self._events = session.info.declare_link_events_listener(self._note, history=True)
-
-    def sessions(self) -> Counter[str]:
-        """Return how many processes are connected, by role; those without are under ``""``."""
-        return Counter(link.auth_identifier or "" for link in self._session.info.links())
-
-    def _note(self, event: zenoh.LinkEvent) -> None:
-        link, came = event.link, event.kind == zenoh.SampleKind.PUT
-        self.peers.note(str(link.zid), link.auth_identifier or "", str(link.dst), came=came)
-
-    def close(self) -> None:
-        """Stop routing."""
-        _close(self._session)
-
-
-def open_router(cfg: BusConfig, log_filter: str = "off") -> Router:
-    """Return a running router on ``cfg.listen``.
-
-    Args:
-        cfg: of the bus.
-        log_filter: what the library writes to stdout; it would repeat our one line in twenty.
-
-    Raises:
-        ConfigError: it cannot listen there, or its certificate is not there.
-    """
-    if cfg.certificates:
-        check_files(cfg.certificates, "router")
-    config = router_json(cfg)
-    warn_of_plain_network(cfg)
-    zenoh.init_log_from_env_or(log_filter)
-    try:
-        return Router(_open(config), cfg.listen)
-    except zenoh.ZError as error:
-        text = str(error)
-        where = ", ".join(cfg.listen)
-        if "in use" in text:
-            raise ConfigError(
-                f"cannot listen on {where}: the port is in use; stop the other router, "
-                "or give another endpoint with --listen"
-            ) from error
-        raise ConfigError(f"cannot listen on {where}: {text.split(' at /')[0]}") from error
-
-
-def hear_runs(
-    cfg: BusConfig, name: str, clock: Clock, role: Role, topic: Topic[Any], seconds: float
-) -> frozenset[str]:
-    """Return the names of the runs that say something of a topic within so many seconds.
-
-    Raises:
-        BusError: no router answered.
-        ConfigError: as ``open_zenoh``.
-    """
-    with contextlib.closing(open_zenoh(cfg, name, clock, "any", role)) as bus:
-        return bus.runs(topic, seconds)
 
 
 class ZenohBus:
@@ -196,7 +131,7 @@ class ZenohBus:
             clock, self._counts, self._news.set, cfg.inbox_messages, cfg.inbox_mib << 20
         )
         self._watchdog = Watchdog(
-            cfg, clock, session, _has_router, lambda: _try_open(config), _close
+            cfg, clock, session, _has_router, lambda: _try_open(config), close_session
         )
         self._declared: dict[object, tuple[Declare, Any]] = {}
         self._present: dict[str, Present] = {}
@@ -427,7 +362,12 @@ def _note_run(names: set[str], key: str) -> None:
         names.add(key.removeprefix(f"{PREFIX}/").partition("/")[0])
 
 
-def _open(config: str) -> zenoh.Session:
+def open_session(config: str) -> zenoh.Session:
+    """Return a session of Zenoh's own.
+
+    Raises:
+        ZError: it does not open.
+    """
     return zenoh.open(zenoh.Config.from_json5(config))
 
 
@@ -437,11 +377,11 @@ def _has_router(session: zenoh.Session) -> bool:
 
 def _try_open(config: str) -> zenoh.Session | None:
     with contextlib.suppress(zenoh.ZError):
-        return _open(config)
+        return open_session(config)
     return None
 
 
-def _close(session: zenoh.Session) -> None:
+def close_session(session: zenoh.Session) -> None:
     """Close a session, at most ``CLOSE_SECONDS`` long."""
 
     def close() -> None:

@@ -10,7 +10,8 @@ from services.actor import joining
 from services.jobs import status
 from shared.bus.config import BusConfig
 from shared.bus.ports import free_port
-from shared.bus.zenoh import open_router, open_zenoh
+from shared.bus.routing import open_router
+from shared.bus.zenoh import open_zenoh
 from shared.clock import SystemClock
 from shared.errors import ConfigError
 from shared.messages.league import Schedule

@@ -17,7 +17,8 @@ from services.league.ledger import open_read_only
 from shared.bus.base import Bus
 from shared.bus.config import BusConfig
 from shared.bus.delivery import Outbox
-from shared.bus.zenoh import open_router, open_zenoh
+from shared.bus.routing import open_router
+from shared.bus.zenoh import open_zenoh
 from shared.clock import SystemClock
 from shared.messages.league import BoutResults, Incident, Lease, LeaseRequest
 from shared.messages.topics import INCIDENT, LEASE, RESULTS, VERSION

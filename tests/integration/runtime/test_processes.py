@@ -14,7 +14,8 @@ from services.jobs.doctor.machine import check_bus
 from services.jobs.status import main as status
 from shared.bus.config import BusConfig
 from shared.bus.ports import free_port
-from shared.bus.zenoh import open_router, open_zenoh
+from shared.bus.routing import open_router
+from shared.bus.zenoh import open_zenoh
 from shared.clock import SystemClock
 from shared.runtime.service import Health, run
 
