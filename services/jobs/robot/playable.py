@@ -6,7 +6,7 @@ import numpy as np
 
 from services.robot_io.config import RobotIoConfig, SafetyConfig
 from services.robot_io.poses import Pose, distance, length, pose_of, rotation_between
-from services.robot_io.scene import blade_of
+from services.robot_io.scene import PROTAGONIST, blade_of
 from shared.config.site import load_section
 from shared.errors import ConfigError
 from shared.identification.excitation.limits import Blade, ToolLimits, tool_hurry
@@ -20,7 +20,6 @@ START_M = 0.02
 START_RAD = 0.1
 """A programme begins this close to where the robot waits between bouts."""
 ROUNDING = 1e-6
-PROTAGONIST = 1
 
 
 def tool_limits(safety: SafetyConfig, model: FencingModel) -> ToolLimits:

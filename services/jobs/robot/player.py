@@ -20,6 +20,7 @@ from services.robot_io.poses import (
     rotation_between,
     scale,
 )
+from services.robot_io.scene import PROTAGONIST
 from shared.bus.base import Bus, NoAnswer, Pending, Refused
 from shared.clock import Clock
 from shared.identification.excitation.reading import AT, PosePlan, Stretch
@@ -37,7 +38,6 @@ from shared.messages.play import (
 from shared.messages.topics import ARM, BATS, BOUT, GATE, OFFSET, REFEREE
 
 AGENT: Final = "protagonist"
-PROTAGONIST: Final = 1
 NOBODY: Final = "nobody"
 """Who plays the antagonist, as the archive has it."""
 ASK_SECONDS: Final = 2.0
