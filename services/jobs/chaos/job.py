@@ -37,7 +37,7 @@ CALM_SECONDS = 3 * WINDOW
 """Undisturbed at the start of a run, before the first fault."""
 FINISH_SECONDS = 600.0
 BATCH_SAMPLES = 1280
-STAGE_UPDATES = 300
+STAGE_UPDATES = 900
 ITERATIONS = 2
 SMALL = (
     "actor.num_envs=16",
