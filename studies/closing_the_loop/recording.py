@@ -4,6 +4,7 @@ import argparse
 import dataclasses
 import shutil
 from collections.abc import Callable
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -12,6 +13,7 @@ from services.jobs.identify import excite
 from services.jobs.identify.from_bouts import of_bouts
 from services.jobs.robot.play_programme import chosen
 from services.jobs.robot.player import Player
+from services.jobs.virtual_site import VirtualSite
 from services.robot_io.config import RobotIoConfig, SafetyConfig
 from shared.errors import RobotFault
 from shared.identification.dataset.types import Dataset, Trajectory
@@ -22,13 +24,14 @@ from shared.runtime.files import atomic_write
 from shared.sim.parameters import JOINT_NAMES, dump_parameters, load_parameters
 from shared.telemetry.archive import archived_bouts, load_bout
 from studies.closing_the_loop.protocol import Folders, Protocol, need
-from studies.closing_the_loop.virtual_site import VirtualSite
 
 Say = Callable[[str], None]
 MOST_SECONDS = 600.0
 """Of the twin's time, to play a programme."""
 SETTLED = 1.0
 """After the last recording, until the recorder has filed it (s)."""
+PARKED = Path(__file__).resolve().parents[2] / "deploy" / "parked_bat.npy"
+"""A bat that lies still, 3 m away."""
 
 
 def hide(protocol: Protocol, folders: Folders, say: Say) -> None:
@@ -86,7 +89,9 @@ def record(protocol: Protocol, folders: Folders, say: Say) -> None:
 
 def _play(protocol: Protocol, folders: Folders, plan: PosePlan, say: Say) -> None:
     sim = msgspec.structs.replace(protocol.twin, model=str(need(folders.truth, "hide")))
-    robot = RobotIoConfig(twin_filter=1.0, twin_delay=0.0, twin_force=30.0)
+    robot = RobotIoConfig(
+        twin_filter=1.0, twin_delay=0.0, twin_force=30.0, tracker="replay", replay=str(PARKED)
+    )
     site = VirtualSite(folders.recorded, robot, SafetyConfig(), sim)
     try:
         person = site.join("robot-1")

@@ -10,12 +10,13 @@ import pyarrow.parquet as pq
 import tomli_w
 
 from services.jobs.robot.player import Player
+from services.jobs.virtual_site import VirtualSite
 from services.robot_io.config import RobotIoConfig, SafetyConfig
 from shared.identification.excitation.reading import PosePlan, Stretch, read_programme
 from shared.sim.config import SimConfig
 from shared.sim.model import FencingModel
 from shared.sim.twin import Twin, command_of
-from studies.closing_the_loop.virtual_site import VirtualSite
+from studies.closing_the_loop.recording import PARKED
 
 COLUMNS = ("x", "y", "z", "qw", "qx", "qy", "qz")
 
@@ -59,7 +60,8 @@ class Stage:
     """A player on a site, and the person beside it."""
 
     def __init__(self, folder: Path, plan: PosePlan, **robot: Any) -> None:
-        cfg = RobotIoConfig(twin_filter=1.0, twin_delay=0.0, **robot)
+        parked = {"tracker": "replay", "replay": str(PARKED)}
+        cfg = RobotIoConfig(twin_filter=1.0, twin_delay=0.0, **{**parked, **robot})
         self.folder = folder
         self.site = VirtualSite(folder, cfg, SafetyConfig(ramp=0.5), SimConfig())
         self.bus = self.site.join("robot-1")
