@@ -25,6 +25,8 @@ pytestmark = [pytest.mark.zenoh, pytest.mark.slow, pytest.mark.timeout(900)]
 
 
 Commands = dict[str, list[str]]
+LASTING = ("league.antagonist_updates=100000",)
+"""The run goes on until every metric was seen: actors leave with it, and nobody is to be gone."""
 
 
 def of_compose() -> Commands:
@@ -84,7 +86,7 @@ class Job:
         words = [next((here + word.removeprefix(place) for place, here in mine.items()
                        if word.startswith(place)), self._put(word)) for word in words]  # fmt: skip
         here = (f"metrics.port={self.metrics_port}", "metrics.host='127.0.0.1'")
-        settings = (*SMALL, *here, "bus.open_seconds=120")
+        settings = (*SMALL, *LASTING, *here, "bus.open_seconds=120")
         if words[0] == "actor":  # the run's settings come from its league
             settings = ("bus.open_seconds=120",)
         words += [word for setting in settings for word in ("--set", setting)]
