@@ -178,9 +178,10 @@ class Archivist:
         """Begin, go on with or end a bout, as the referee says."""
         bout = self._bout
         is_own = bout is not None and bout.info.bout == state.bout and bout.ends_at is None
+        begins = state.phase in IN_BOUT and state.is_recorded and not is_own
         if bout is not None and not is_own and bout.ends_at is None:
             self._end(bout, "interrupted", "the referee was restarted", now)
-        if state.phase in IN_BOUT and not is_own and state.bout != self._given_up:
+        if begins and state.bout != self._given_up:
             if bout is not None:
                 self._finish(bout, heard.dropped)
             bout = self._begin(state, heard)

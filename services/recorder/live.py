@@ -80,6 +80,7 @@ class Live:
         self._has_begun = False
         self._due = clock.now()
         self._phase = self._mode = ""
+        self._is_recorded = True
         self.rows = 0
         """Drawn since the start, all streams."""
 
@@ -179,7 +180,7 @@ class Live:
 
     def _gather(self, heard: Heard, now: float) -> None:
         """Keep for the file what belongs to a bout; of the time between bouts, the heart rate."""
-        if self._phase == "running":
+        if self._phase == "running" and self._is_recorded:
             self._files_until = now + LONG_PAUSE
         elif self._phase != "paused":
             self._files_until = min(self._files_until, now + LEAD_OUT)
@@ -213,6 +214,7 @@ class Live:
 
     def _narrate(self, heard: Heard) -> None:
         for state in heard.referee:
+            self._is_recorded = state.is_recorded
             if state.phase != self._phase:
                 self._phase = state.phase
                 text = f"bout {state.bout}: {state.phase}" if state.bout else "ready for a bout"

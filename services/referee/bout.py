@@ -31,6 +31,9 @@ class Fixture:
     bout: str
     antagonist: str
     protagonist: str
+    speed: float = 1.0
+    """Share of its speed that the robot's tool may have."""
+    is_recorded: bool = True
 
 
 class LiveBout:
@@ -198,4 +201,6 @@ class LiveBout:
             camping_steps=int(scores.camping_steps[0]),
             missed_ticks=self.missed_ticks,
             tone_hz=tone,
+            speed=self.fixture.speed,
+            is_recorded=self.fixture.is_recorded,
         )

@@ -116,7 +116,11 @@ class Referee:
                 raise ValueError(f"bout {name!r} is {self._bout.phase.value}: abandon it first")
             if self._bout.fixture.bout == asked.bout:
                 raise ValueError(f"there has been a bout {asked.bout!r}: give a new name")
-        fixture = Fixture(asked.bout, asked.antagonist, asked.protagonist)
+        if not 0.0 <= asked.speed <= 1.0:  # also refuses NaN
+            raise ValueError(f"a speed of {asked.speed:g} times the robot's: 0 to 1 can be asked")
+        fixture = Fixture(
+            asked.bout, asked.antagonist, asked.protagonist, asked.speed, asked.is_recorded
+        )
         board = self._board()
         if asked.seconds != 0.0:
             if not self._timestep <= asked.seconds <= MAX_SECONDS:  # also refuses NaN

@@ -43,6 +43,12 @@ class Course:
         return state.seconds + max(tick - 1 - state.tick, 0) * self._period
 
     @property
+    def speed(self) -> float:
+        """Return the share of its speed that the tool may have, as the referee said last."""
+        speed = self._state.speed if self._state is not None else 1.0
+        return speed if 0.0 <= speed <= 1.0 else 0.0
+
+    @property
     def is_between(self) -> bool:
         """Return whether there is a referee, and no bout."""
         return self._state is not None and self._state.phase in BETWEEN

@@ -40,6 +40,8 @@ class GateInputs(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     """Where a policy wants the tool, if it said so since the last tick."""
     is_home: bool = False
     """Whether the command leads back en garde between bouts, at warm-up speed."""
+    speed_share: float = 1.0
+    """Of the speed in a bout, what this one may have: 0 to 1."""
     tracker_at: float
     """When the person's bat was seen last."""
     is_tracked: bool
@@ -324,7 +326,9 @@ class Gate:
 
     def _speed(self, memory: GateMemory, inputs: GateInputs, mode: GateMode) -> float:
         """Return the tool's largest speed now (m/s): minimum-jerk from 0 while ramping."""
-        speed = self.cfg.warm_up_speed if inputs.is_home else self.cfg.game_speed
+        speed = self.cfg.game_speed * inputs.speed_share
+        if inputs.is_home:
+            speed = self.cfg.warm_up_speed
         if mode != "ramping":
             return speed
         share = min(max((inputs.now - memory.armed_at) / self.cfg.ramp, 0.0), 1.0)

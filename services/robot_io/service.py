@@ -297,6 +297,7 @@ class RobotIo:
             speed=robot.speed,
             command=command,
             is_home=is_home,
+            speed_share=self._course.speed,
             tracker_at=tracked.seen_at,
             is_tracked=tracked.is_valid,
             tracker_problem=tracked.problem,

@@ -89,6 +89,10 @@ class PlayRequest(Message, frozen=True, kw_only=True):
     reason: str = ""
     seconds: float = 0.0
     """How long the bout is (start; s); 0 is as the rule book says."""
+    speed: float = 1.0
+    """Share of its speed in a bout that the robot's tool may have (start); 0 keeps it still."""
+    is_recorded: bool = True
+    """Whether the recorder archives the bout (start)."""
 
 
 class PlayReply(Message, frozen=True, kw_only=True):
@@ -144,6 +148,10 @@ class RefereeState(Message, frozen=True, kw_only=True):
     """Ticks that never arrived, judged as the one before."""
     tone_hz: float
     """440 while scoring, 300 on a penalty, 0 for silence."""
+    speed: float = 1.0
+    """Share of its speed that the robot's tool may have in this bout; 0 keeps it still."""
+    is_recorded: bool = True
+    """Whether the recorder archives the bout."""
 
 
 class GateRequest(Message, frozen=True, kw_only=True):

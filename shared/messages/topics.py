@@ -45,13 +45,16 @@ from shared.messages.training import (
 )
 
 Role = Literal[
-    "league", "learner", "actor", "recorder", "referee", "policy", "robot_io", "page", "metrics",
-    "operator",
+    "league", "learner", "actor", "recorder", "referee", "policy", "robot_io", "page", "study",
+    "metrics", "operator",
 ]  # fmt: skip
 """Who speaks on the bus; ``operator`` is what a person's commands are."""
 ROLES: tuple[Role, ...] = get_args(Role)
 SERVICE_ROLES: tuple[Role, ...] = tuple(role for role in ROLES if role != "operator")
-_SEEN_BY: dict[Role, tuple[Role, ...]] = {"referee": ("policy", "page"), "policy": ("page",)}
+_SEEN_BY: dict[Role, tuple[Role, ...]] = {
+    "referee": ("policy", "page", "study"), "policy": ("page", "study"), "robot_io": ("study",),
+    "recorder": ("study",),
+}  # fmt: skip
 WATCHERS: dict[Role, tuple[Role, ...]] = {
     role: (*_SEEN_BY.get(role, ()), "operator") for role in SERVICE_ROLES
 }
@@ -160,7 +163,8 @@ PROGRESS = Topic(
 )
 STATUS = Topic(
     "status/{role}/{name}", ServiceStatus, Qos.LATEST, 64 * KIB, SERVICE_ROLES,
-    ("recorder", "page", "metrics", "operator"), "health, rates, and whom a service waits for",
+    ("recorder", "page", "study", "metrics", "operator"),
+    "health, rates, and whom a service waits for",
 )
 FRAMES = Topic(
     "actor/{name}/frames", BoutFrames, Qos.STREAM, 8 * MIB, ("actor",), ("recorder",),
@@ -168,7 +172,7 @@ FRAMES = Topic(
 )
 BATS = Topic(
     "play/bats", BatStates, Qos.STREAM, 4 * KIB, ("robot_io",),
-    ("policy", "referee", "page", "recorder", "operator"), "both bats, 100 a second",
+    ("policy", "referee", "page", "study", "recorder", "operator"), "both bats, 100 a second",
 )
 ARMS = Topic(
     "play/arms", ArmStates, Qos.STREAM, 4 * KIB, ("robot_io",), ("page", "recorder"),
@@ -192,27 +196,28 @@ OFFSET = Topic(
 )
 REFEREE = Topic(
     "play/referee", RefereeState, Qos.LATEST, 4 * KIB, ("referee",),
-    ("robot_io", "policy", "page", "recorder", "operator"), "phase, score and tone of the bout",
+    ("robot_io", "policy", "page", "study", "recorder", "operator"),
+    "phase, score and tone of the bout",
 )
 GATE = Topic(
-    "play/gate", GateState, Qos.LATEST, 4 * KIB, ("robot_io",), ("page", "recorder", "operator"),
-    "mode of the safety gate and what it sent",
+    "play/gate", GateState, Qos.LATEST, 4 * KIB, ("robot_io",),
+    ("page", "study", "recorder", "operator"), "mode of the safety gate and what it sent",
 )
 HEART_RATE = Topic(
-    "play/heart_rate", HeartRate, Qos.STREAM, 4 * KIB, ("robot_io",), ("recorder", "page"),
+    "play/heart_rate", HeartRate, Qos.STREAM, 4 * KIB, ("robot_io",), ("recorder", "page", "study"),
     "of the person who plays",
 )
 BOUT = Service(
-    "play/bout", PlayRequest, PlayReply, 4 * KIB, 4 * KIB, ("page", "operator"), "referee",
-    "starts, pauses and ends a bout",
+    "play/bout", PlayRequest, PlayReply, 4 * KIB, 4 * KIB, ("page", "study", "operator"),
+    "referee", "starts, pauses and ends a bout",
 )
 PLAYER = Service(
-    "play/{agent}/player", PlayerRequest, PlayerReply, 4 * KIB, 4 * KIB, ("page",), "policy",
-    "who plays a side from the next bout on",
+    "play/{agent}/player", PlayerRequest, PlayerReply, 4 * KIB, 4 * KIB, ("page", "study"),
+    "policy", "who plays a side from the next bout on",
 )
 ARM = Service(
-    "play/arm", GateRequest, GateReply, 4 * KIB, 16 * KIB, ("page", "operator"), "robot_io",
-    "a person arms or disarms the robot",
+    "play/arm", GateRequest, GateReply, 4 * KIB, 16 * KIB, ("page", "study", "operator"),
+    "robot_io", "a person arms or disarms the robot",
 )
 
 # fmt: on

@@ -52,6 +52,7 @@ class Person:
         inputs = GateInputs(
             now=now, measured=measured, state_at=now, speed=0.0, command=self.command(tool),
             tracker_at=now, is_tracked=True, is_home=self.draw.random() < 0.02,
+            speed_share=self.draw.choice((1.0, 1.0, 0.3, 0.0)),
         )  # fmt: skip
         if self.draw.random() >= self.trouble:
             return inputs

@@ -137,17 +137,18 @@ class Fencing:
                 rates={"lateness_p99_ms": 0.4},
             ), role="robot-io", name="robot-io-0")  # fmt: skip
 
-    def start(self, name: str, first: np.ndarray, ticks: int = 30) -> None:
+    def start(self, name: str, first: np.ndarray, ticks: int = 30, **fields: Any) -> None:
         """Show both bats en garde, then start a bout."""
         for _ in range(ticks):
             self.bring(first)
-        answer = self.ask("start", name)
+        answer = self.ask("start", name, **fields)
         assert answer.accepted, answer.reason
 
-    def ask(self, action: Any, name: str) -> PlayReply:
+    def ask(self, action: Any, name: str, **fields: Any) -> PlayReply:
         asked = PlayRequest(
-            action=action, bout=name, antagonist="sha256:" + "ab" * 32, protagonist="scripted:guard"
-        )
+            action=action, bout=name, antagonist="sha256:" + "ab" * 32,
+            protagonist="scripted:guard", **fields,
+        )  # fmt: skip
         pending = self.bus.ask(topics.BOUT, asked, 1.0)
         self.referee.tick()
         answer = pending.take()

@@ -202,6 +202,16 @@ def test_a_bout_whose_folder_is_taken_gets_another(tmp_path: Path):
     assert [load_bout(folder).info.bout for folder in found] == names
 
 
+def test_a_bout_that_is_not_to_be_recorded_is_in_no_archive(tmp_path: Path):
+    fencing = Fencing(tmp_path, ONLY_ARCHIVE, rules=RuleBook(bout_steps=20))
+    fencing.start("warm-up", EN_GARDE, is_recorded=False)
+    fencing.rest(EN_GARDE, 80)
+    fencing.start("game", EN_GARDE)
+    fencing.rest(EN_GARDE, 80)
+    fencing.recorder.close()
+    assert [folder.name for folder in archived_bouts(tmp_path)] == ["game"]
+
+
 def test_a_long_pause_is_not_archived_from_end_to_end(tmp_path: Path):
     fencing = Fencing(tmp_path, ONLY_ARCHIVE, rules=RULES)
     fencing.start("one", EN_GARDE)

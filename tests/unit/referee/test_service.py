@@ -296,3 +296,23 @@ def test_who_starts_a_bout_may_say_how_long_it_is():
     assert "a bout of 1000 s: 0.01 to 600 s" in reply.reason
     assert stand.start("last").accepted
     assert stand.bring(HIT, 5).phase == "finished"
+
+
+def test_who_starts_a_bout_may_slow_the_robot_and_keep_the_bout_out_of_the_archive():
+    stand = Stand()
+    stand.bring(APART, 25)
+    names = {"antagonist": "person", "protagonist": "scripted:guard"}
+    assert stand.ask("start", **names, speed=0.3, is_recorded=False).accepted
+    assert (stand.state.speed, stand.state.is_recorded) == (0.3, False)
+    stand.ask("abandon")
+    assert stand.ask("start", "two", **names).accepted
+    assert (stand.state.speed, stand.state.is_recorded) == (1.0, True)
+
+
+@pytest.mark.parametrize("speed", [-0.1, 1.1, float("nan")])
+def test_a_speed_that_is_no_share_is_refused(speed: float):
+    stand = Stand()
+    stand.bring(APART, 25)
+    reply = stand.ask("start", antagonist="a", protagonist="b", speed=speed)
+    assert not reply.accepted
+    assert "0 to 1 can be asked" in reply.reason

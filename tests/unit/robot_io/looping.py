@@ -79,12 +79,12 @@ class Looping:
         assert self.seen[-1].mode == "armed"
         return self
 
-    def say_referee(self, phase: Any, seconds: float = 0.0) -> None:
+    def say_referee(self, phase: Any, seconds: float = 0.0, speed: float = 1.0) -> None:
         state = RefereeState(
             bout="b", phase=phase, antagonist="a", protagonist="p", tick=self.states[-1].tick,
             step=round(seconds * 100), seconds=seconds, score=0.0, points=0.0,
             in_target=np.zeros(2, bool), contact=False, attack_steps=0, penalty_steps=0,
-            camping_steps=0, missed_ticks=0, tone_hz=0.0,
+            camping_steps=0, missed_ticks=0, tone_hz=0.0, speed=speed,
         )  # fmt: skip
         self.bench.publish(REFEREE, state)
 

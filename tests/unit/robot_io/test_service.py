@@ -1,3 +1,4 @@
+import math
 from pathlib import Path
 
 import numpy as np
@@ -134,6 +135,31 @@ def test_between_bouts_the_robot_goes_home():
     looping.say_referee("finished")
     looping.tick(200)
     assert np.linalg.norm(looping.tool[:3] - home) < 0.02
+
+
+@pytest.mark.parametrize("speed", [1.0, 0.3, 0.0])
+def test_a_bout_may_be_slower_than_others(speed: float):
+    """At full speed the twin that lags behind is what slows it."""
+    looping = Looping().armed()
+    looping.say_referee("running", speed=speed)
+    looping.offset = UP
+    looping.tick(60)
+    tools = np.array([gate.commanded[:3] for gate in looping.seen[-60:]])
+    steps = np.linalg.norm(np.diff(tools, axis=0), axis=1)
+    limit = 0.01 * looping.parts.gate.cfg.game_speed
+    if speed == 1.0:
+        assert 0.5 * limit < steps.max() < limit
+    else:
+        assert steps.max() == pytest.approx(speed * limit, abs=1e-9)
+
+
+def test_a_speed_that_is_no_share_keeps_the_robot_still():
+    looping = Looping()
+    looping.tick(3)
+    for speed in (math.nan, -1.0, 1.5):
+        looping.say_referee("running", speed=speed)
+        looping.tick(2)
+        assert looping.service._course.speed == 0.0
 
 
 def test_disarming_holds_at_once():
