@@ -6,20 +6,13 @@ from typing import Any
 
 import msgspec
 
-from services.page.web import Asset
 from shared.errors import ConfigError
+from shared.runtime.web import Asset, load_files
 from shared.sim.chain import chain_of
 from shared.sim.model import FencingModel
 
 STATIC = Path(__file__).parent / "static"
 SCENE_PATH = "/scene.json"
-_KINDS = {
-    ".html": "text/html; charset=utf-8",
-    ".js": "text/javascript; charset=utf-8",
-    ".css": "text/css; charset=utf-8",
-    ".svg": "image/svg+xml",
-    ".LICENSE": "text/plain; charset=utf-8",
-}
 
 
 def load_assets(scene: Mapping[str, Any], folder: Path = STATIC) -> dict[str, Asset]:
@@ -28,13 +21,10 @@ def load_assets(scene: Mapping[str, Any], folder: Path = STATIC) -> dict[str, As
     Raises:
         ConfigError: the installation lacks them.
     """
-    found: dict[str, Asset] = {}
-    for path in sorted(folder.rglob("*")):
-        if path.is_file() and path.suffix in _KINDS:
-            name = "/" + path.relative_to(folder).as_posix()
-            found[name] = Asset(path.read_bytes(), _KINDS[path.suffix])
+    found = load_files(folder)
     if "/index.html" not in found:
         raise ConfigError(f"{folder} has no index.html: install Riposte again")
+    found["/"] = found["/index.html"]
     body = msgspec.json.encode(scene)
     found[SCENE_PATH] = Asset(body, "application/json")
     return found

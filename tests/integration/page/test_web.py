@@ -14,8 +14,9 @@ from websockets.sync.client import ClientConnection, connect
 
 from services.page.assets import load_assets
 from services.page.protocol import MAX_BYTES, GateAsk
-from services.page.web import MISBEHAVED, TAKEN_OVER, Web
+from services.page.web import Web
 from shared.errors import ConfigError
+from shared.runtime.talk import MISBEHAVED, TAKEN_OVER
 
 ARM = '{"type":"gate","action":"arm"}'
 
@@ -89,8 +90,8 @@ def test_nothing_else_is_served(web: Web, path: str):
     assert fetch(web, path)[0] == 404
 
 
-def test_nothing_of_the_page_comes_from_elsewhere(web: Web):
-    for path, asset in web._assets.items():
+def test_nothing_of_the_page_comes_from_elsewhere():
+    for path, asset in load_assets({}).items():
         if not path.startswith("/vendor"):
             assert b"https://" not in asset.body, path
             assert b"@import" not in asset.body, path
@@ -250,7 +251,7 @@ def test_a_browser_that_reads_slowly_still_gets_whole_files(web: Web):
         received = 0
         while chunk := slow.recv(65536):
             received += len(chunk)
-    assert received > len(web._assets["/vendor/three.core.min.js"].body)
+    assert received > len(load_assets({})["/vendor/three.core.min.js"].body)
 
 
 def test_a_browser_that_never_answers_does_not_hold_up_the_end():
