@@ -17,6 +17,8 @@ MAX_TEXT = 2000
 MAX_ANSWERS = 64
 MAX_CHOICES = 64
 """Most options of one item, chosen or ranked."""
+MAX_POINTS = 11
+"""Of a scale."""
 MAX_BYTES = 1 << 20
 """Longest ask; the bounds above keep within it, however a browser writes its characters."""
 
@@ -24,7 +26,7 @@ Screen = Literal[
     "welcome", "consent", "text", "countdown", "playing", "score", "rest", "questionnaire",
     "ranking", "waiting", "thanks",
 ]  # fmt: skip
-Scale = Literal["agreement", "choices", "ranking", "open"]
+Scale = Literal["points", "choices", "ranking", "open"]
 Course = Literal["new", "running", "paused", "aborted", "ended"]
 ResearcherAction = Literal[
     "begin", "next", "repeat", "void", "note", "pause", "resume", "abort", "arm", "disarm", "reset"
@@ -165,22 +167,24 @@ class ResearcherView(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Item(msgspec.Struct, frozen=True, kw_only=True):
-    """One question of a questionnaire or ranking."""
+    """One question of a questionnaire or ranking, as ``shared.study.protocol.Item`` has it."""
 
     id: str
     text: str
     scale: Scale
+    points: int = 5
+    """``points``: how many."""
+    labels: tuple[str, ...] = ()
+    """``points``: words for each of them; () for the page's own where there are five."""
     options: tuple[str, ...] = ()
-    """``choices``: any number of them may be chosen. ``ranking``: what is put in order, as
-    ``Section 1``. ``agreement``: words for the five points, or () for the page's own."""
+    """``choices``: what can be chosen. ``ranking``: what is put in order, as ``Section 1``."""
+    is_several: bool = False
+    """``choices``: more than one may be chosen."""
     other: str = ""
-    """The one of ``options`` that comes with a line to describe it; empty for none."""
+    """``choices``: the option that comes with a line to describe it; empty for none."""
     ends: tuple[str, str] = ("", "")
     """``ranking``: words for the least and the most; empty for the page's own."""
-    why: str = ""
-    """A question for a free text under the item, as ``Why?``; empty for none."""
     is_required: bool = True
-    """The free text never is, unless the item is ``open``."""
 
 
 class ParticipantView(msgspec.Struct, frozen=True, kw_only=True):
@@ -221,7 +225,7 @@ class ParticipantView(msgspec.Struct, frozen=True, kw_only=True):
 
 
 _Id = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9\-]{1,64}\Z")]
-_Name = Annotated[str, msgspec.Meta(max_length=200)]
+_Name = Annotated[str, msgspec.Meta(max_length=400)]
 _Text = Annotated[str, msgspec.Meta(max_length=MAX_TEXT)]
 _Place = Annotated[int, msgspec.Meta(ge=1, le=MAX_CHOICES)]
 
@@ -230,14 +234,14 @@ class Answer(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """The answer to one item; what does not belong to its scale stays empty."""
 
     item: _Name
-    value: Annotated[int, msgspec.Meta(ge=1, le=5)] | None = None
-    """``agreement``: 1 (strongly disagree) to 5 (strongly agree)."""
+    value: Annotated[int, msgspec.Meta(ge=1, le=MAX_POINTS)] | None = None
+    """``points``: from 1, as the person chose; not turned round for a reversed item."""
     choices: Annotated[tuple[_Name, ...], msgspec.Meta(max_length=MAX_CHOICES)] = ()
     """``choices``: options that were chosen."""
     ranks: Annotated[tuple[_Place, ...], msgspec.Meta(max_length=MAX_CHOICES)] = ()
     """``ranking``: in the order of the options, 1 is the least; equal ones are a tie."""
     text: _Text = ""
-    """``open``, the description of ``other``, or why."""
+    """``open``, or the description of ``other``."""
 
 
 class ResearcherAsk(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
