@@ -1,5 +1,6 @@
 """Keys on the bus, from the templates of the topic table."""
 
+import functools
 import re
 import string
 
@@ -51,6 +52,7 @@ def check_chunk(what: str, value: str) -> None:
         raise ValueError(f"{what} {value!r} must be 1 to 255 letters, digits, '.', '_' or '-'")
 
 
+@functools.lru_cache(maxsize=4096)
 def matches(pattern: str, key: str) -> bool:
     """Return whether a key matches a pattern with ``*`` for whole chunks."""
     want, have = pattern.split("/"), key.split("/")

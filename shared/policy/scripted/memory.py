@@ -42,6 +42,12 @@ class Memory:
         before[:] = seconds
         return is_new
 
+    @property
+    def count(self) -> int | None:
+        """Return of how many worlds this is the memory; None before the first step."""
+        before = self._arrays.get(_TIME)
+        return None if before is None else len(before)
+
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Return an array, to be read and written."""
         return self._arrays[name]

@@ -114,31 +114,41 @@ class Person(Remembering):
 
     def __init__(self, arena: Arena, character: Character) -> None:
         super().__init__(arena.with_bounds_scaled(self.offset_scale))
+        self.become(character)
+
+    def become(self, character: Character) -> None:
+        """Play as this character from the next bout on; what was learned stays."""
         self._character = character
         self._reaching = Reaching(self._memory, character.peak_speed)
         self._senses = Senses(
             self._memory,
             self._arena,
-            round(character.sight_seconds / arena.control_timestep),
-            round(character.hearing_seconds / arena.control_timestep),
+            round(character.sight_seconds / self._arena.control_timestep),
+            round(character.hearing_seconds / self._arena.control_timestep),
             character.anticipation,
             character.lead,
         )
+        if (count := self._memory.count) is not None:
+            self._senses.allocate(count)
 
     def act(self, obs: Float32s, generator: np.random.Generator) -> Float32s:
         """Return float32[N, 6]."""
         sight = Sight.of(obs)
+        wanted = self.wish(sight, generator)
+        return noisy(track(sight, *wanted, self._arena), self._character.noise, generator)
+
+    def wish(self, sight: Sight, generator: np.random.Generator) -> tuple[Floats, Floats]:
+        """Return where grips and blades should be now: float64[3, N] each."""
         is_new = self._memory.begin(sight.seconds)
         if is_new is None:
-            is_new = np.ones(len(obs), np.bool_)
-            self._allocate(len(obs), generator)
+            is_new = np.ones(len(sight.seconds), np.bool_)
+            self._allocate(len(is_new), generator)
         if is_new.any():
             self._begin_bout(is_new, sight, generator)
         grips, blades, heard = self._senses.perceive(sight)
         self._learn(sight, heard)
         self._decide(sight, grips, blades, heard, generator)
-        wanted = self._reaching.pose(sight.seconds)
-        return noisy(track(sight, *wanted, self._arena), self._character.noise, generator)
+        return self._reaching.pose(sight.seconds)
 
     def _allocate(self, count: int, generator: np.random.Generator) -> None:
         memory = self._memory
