@@ -12,7 +12,8 @@
     ├── BusError                no session, no answer, or a refused request
     │   └── StaleInput          an input older than its deadline
     ├── RobotFault              the robot, or what guards it, refuses
-    └── IdentificationError     a data set or a fit that cannot be used
+    ├── IdentificationError     a data set or a fit that cannot be used
+    └── StudyError              a study's folder that is damaged, or that does not allow it
 
 ``ValueError`` stays the word for a caller's bug.
 """
@@ -60,3 +61,7 @@ class RobotFault(RiposteError):
 
 class IdentificationError(RiposteError):
     """A data set or a fit that cannot be used."""
+
+
+class StudyError(RiposteError):
+    """A study's folder that is damaged, or in which what is asked for cannot be done."""

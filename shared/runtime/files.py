@@ -14,11 +14,13 @@ OUT_OF_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 MIB = 1 << 20
 
 
-def atomic_write(path: str | os.PathLike[str], data: bytes | bytearray | memoryview) -> None:
+def atomic_write(
+    path: str | os.PathLike[str], data: bytes | bytearray | memoryview, mode: int | None = None
+) -> None:
     """Write ``data`` to ``path`` so that a reader, or a crash, sees the old file or the new one.
 
     The bytes go to a temporary file in the same folder, are synced, renamed over ``path``, and
-    the folder is synced.
+    the folder is synced. ``mode`` is who may read it, None for whom the umask allows.
 
     Raises:
         RiposteError: there is no space, or the folder cannot be written; the old file is intact.
@@ -27,13 +29,15 @@ def atomic_write(path: str | os.PathLike[str], data: bytes | bytearray | memoryv
     temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
         with temporary.open("wb", buffering=0) as file:
+            if mode is not None:
+                os.fchmod(file.fileno(), mode)
             _write_all(file.fileno(), memoryview(data))
             os.fsync(file.fileno())
         os.replace(temporary, target)
     except OSError as error:
         with contextlib.suppress(OSError):
             temporary.unlink()
-        raise _explain(error, target, len(data)) from error
+        raise explain(error, target, len(data)) from error
     sync_folder(target.parent)
 
 
@@ -74,7 +78,7 @@ class RunLock:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         except OSError as error:
-            raise _explain(error, self.path, 0) from error
+            raise explain(error, self.path, 0) from error
         self._descriptor: int | None = descriptor
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -118,7 +122,14 @@ def _existing(path: Path) -> Path:
     return path
 
 
-def _explain(error: OSError, target: Path, size: int) -> RiposteError:
+def explain(error: OSError, target: Path, size: int) -> RiposteError:
+    """Return what a user is told after a write that failed.
+
+    Args:
+        error: what the system said.
+        target: the file that was to be written.
+        size: of what was to be written (bytes).
+    """
     if error.errno in OUT_OF_SPACE:
         before = (
             f"the {target.name} from before is intact" if target.exists() else "nothing is lost"
