@@ -64,8 +64,19 @@ class Consented(msgspec.Struct, frozen=True, kw_only=True, tag="consented"):
     statements: tuple[str, ...]
 
 
+class Measured(msgspec.Struct, frozen=True, kw_only=True, tag="measured"):
+    """A baseline is over; of one that was interrupted and begun again, only this counts."""
+
+    seconds: float
+    """How long it was."""
+    beats: int
+    """Measurements of the strap in it; 0: the baseline is missing."""
+    beats_per_minute: float | None
+    """Their mean."""
+
+
 class GameStarted(msgspec.Struct, frozen=True, kw_only=True, tag="game_started"):
-    """The referee accepted a bout."""
+    """A bout was asked for at the referee; if it refuses, the game ends at once, void."""
 
     attempt: int
     """Of this game, from 1."""
@@ -161,9 +172,9 @@ class Withdrawn(msgspec.Struct, frozen=True, kw_only=True, tag="withdrawn"):
 
 
 What = (
-    SessionBegan | SessionResumed | StepBegan | StepDone | Consented | GameStarted | GameEnded
-    | Answered | Ranked | Noted | Voided | Repeated | Paused | Unpaused | Aborted | SessionEnded
-    | Withdrawn
+    SessionBegan | SessionResumed | StepBegan | StepDone | Consented | Measured | GameStarted
+    | GameEnded | Answered | Ranked | Noted | Voided | Repeated | Paused | Unpaused | Aborted
+    | SessionEnded | Withdrawn
 )  # fmt: skip
 
 
@@ -178,6 +189,8 @@ class Event(msgspec.Struct, frozen=True, kw_only=True):
     """Nanoseconds since 1970-01-01 UTC."""
     step: str = ""
     """Id of the step that it belongs to."""
+    ask: str = ""
+    """Id of the ask of a page that it came of: asked again, it is not done again."""
     what: What
 
     @property

@@ -54,8 +54,13 @@ class Journal:
         """Return all events so far."""
         return tuple(self._events)
 
-    def write(self, what: What, step: str = "") -> Event:
+    def write(self, what: What, step: str = "", ask: str = "") -> Event:
         """Add an event; when this returns it is on the disk.
+
+        Args:
+            what: happened.
+            step: id of the step that it belongs to.
+            ask: id of the page's ask that it came of.
 
         Raises:
             RiposteError: there is no space, or the file cannot be written; the journal is as it
@@ -71,6 +76,7 @@ class Journal:
             t_ns=round(self._clock.now() * 1e9),
             wall_ns=self._clock.wall_ns(),
             step=step,
+            ask=ask,
             what=what,
         )
         line = _ENCODER.encode(event) + b"\n"

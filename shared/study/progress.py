@@ -13,6 +13,7 @@ from shared.study.events import (
     Event,
     GameEnded,
     GameStarted,
+    Measured,
     Noted,
     Outcome,
     Paused,
@@ -73,6 +74,8 @@ class Progress(msgspec.Struct, kw_only=True):
     is_paused: bool = False
     games: dict[str, list[Attempt]] = msgspec.field(default_factory=dict[str, list[Attempt]])
     """Attempts by id of their step."""
+    baselines: dict[str, Measured] = msgspec.field(default_factory=dict[str, Measured])
+    """By id of the step; the latest."""
     answers: dict[str, Answered] = msgspec.field(default_factory=dict[str, Answered])
     """By id of the step; the latest."""
     rankings: dict[str, Ranked] = msgspec.field(default_factory=dict[str, Ranked])
@@ -134,6 +137,8 @@ def follow(progress: Progress, event: Event) -> None:
             progress.begun = "" if progress.begun == step else progress.begun
         case Consented():
             progress.has_consent = True
+        case Measured():
+            progress.baselines[step] = what
         case GameStarted() | GameEnded():
             _played(progress, event)
         case Voided() | Repeated():

@@ -65,6 +65,8 @@ class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     games: int
     rest: float
     """Between two games (s); none after the last."""
+    rest_below: float = 0.0
+    """A rest goes on until the heart rate is below this (1/min); 0 looks at the time only."""
     text: Text = ""
     """Read before the first game; no such step where it is empty."""
     instruments: tuple[Name, ...] = ()
@@ -72,7 +74,9 @@ class Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
     def __post_init__(self) -> None:
         """Check the ranges."""
-        check_ranges(self, ("games", 1, 99), ("rest", 0.0, 3600.0))
+        check_ranges(
+            self, ("games", 1, 99), ("rest", 0.0, 3600.0), ("rest_below", 0.0, 250.0)
+        )  # fmt: skip
 
 
 class Baseline(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -39,6 +39,8 @@ class Step(msgspec.Struct, frozen=True, kw_only=True):
     """Its data count: games of a section do, warm-up games do not."""
     speed: float = 1.0
     """Share of the robot's speed in a game that counts."""
+    rest_below: float = 0.0
+    """A rest goes on until the heart rate is below this (1/min); 0 looks at the time only."""
 
 
 def steps_of(protocol: Protocol, order: Sequence[str]) -> tuple[Step, ...]:
@@ -112,6 +114,7 @@ def _section(protocol: Protocol, section: Section, number: int, condition: str) 
             yield Step(
                 id=f"s{number}-rest-{game:02d}", kind="rest", section=number,
                 condition=condition, seconds=section.rest, title="Rest", is_recorded=True,
+                rest_below=section.rest_below,
             )  # fmt: skip
     for name in section.instruments:
         yield _asked(protocol, name, number, condition)
