@@ -191,6 +191,9 @@ class ParticipantView(msgspec.Struct, frozen=True, kw_only=True):
     """Everything on the participant's page; never the name of a condition."""
 
     screen: Screen
+    session: str = ""
+    """Says nothing, and is another one for every session: what was typed in one is not shown in
+    the next."""
     step: str = ""
     """Its id; asks name it, so that none counts for another step."""
     title: str = ""
