@@ -1,0 +1,197 @@
+"""Tests of differences within people: the paired t-test and, beside it, Wilcoxon's.
+
+A paired test is a one-sample test of the differences, and is done as one.
+"""
+
+# pyright: basic
+# (scipy's and statsmodels' types are partial)
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+from statsmodels.stats.multitest import multipletests
+
+from shared.study.analysis.finding import (
+    Check,
+    Estimate,
+    Finding,
+    check,
+    missing_text,
+    not_done,
+)
+from shared.study.analysis.intervals import TAIL, effect_dz, mean_estimate
+
+Floats = NDArray[np.float64]
+FEWEST = 3
+"""People below which no test of means is done."""
+NOTHING_VARIES = 1e-12
+"""Spread, relative to the size of the numbers, below which they count as all the same."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Named:
+    """What a test is called in the report."""
+
+    question: str
+    estimate: str = "mean difference"
+    test: str = "paired t-test"
+    unit: str = "people"
+
+
+def paired(first: Floats, second: Floats, named: Named) -> Finding:
+    """Return the paired t-test of first - second, Wilcoxon's signed-rank test beside it.
+
+    Args:
+        first: float64[n], a value a person; NaN where there is none.
+        second: float64[n], of the same people.
+        named: what it is called.
+    """
+    return one_sample(np.asarray(first, np.float64) - np.asarray(second, np.float64), named)
+
+
+def one_sample(values: Floats, named: Named) -> Finding:
+    """Return the t-test of a mean against zero, Wilcoxon's signed-rank test beside it.
+
+    Args:
+        values: float64[n]; NaN is left out.
+        named: what it is called.
+    """
+    there = values[np.isfinite(values)]
+    n = len(there)
+    left_out = missing_text(len(values) - n, "without a value", "no complete pair or value")
+    if n < FEWEST:
+        why = f"{n} values, a test needs at least {FEWEST}"
+        return not_done(named.question, named.test, n, why, unit=named.unit, left_out=left_out)
+    estimate = mean_estimate(there, named.estimate)
+    if _is_constant(there):
+        what = "all are zero" if not there.any() else f"all are {there[0]:g}, nothing varies"
+        made = not_done(named.question, named.test, n, what, unit=named.unit, left_out=left_out)
+        bare = Estimate(name=named.estimate, value=float(there[0]))
+        return msgspec.structs.replace(made, estimate=bare)
+    found: Any = stats.ttest_1samp(there, 0.0)
+    t = float(found.statistic)
+    return Finding(
+        question=named.question,
+        test=named.test,
+        n=n,
+        unit=named.unit,
+        symbol="t",
+        statistic=t,
+        df=(n - 1.0,),
+        p=float(found.pvalue),
+        estimate=estimate,
+        effect=effect_dz(t, n),
+        checks=normality(there, "differences are normal"),
+        beside=(signed_rank(there, named),),
+        left_out=left_out,
+    )
+
+
+def signed_rank(values: Floats, named: Named) -> Finding:
+    """Return Wilcoxon's signed-rank test against zero; zeros are dropped, as he did.
+
+    Args:
+        values: float64[n], finite.
+        named: what it is called.
+    """
+    test = "Wilcoxon signed-rank"
+    moved = values[values != 0.0]
+    if not len(moved):
+        return not_done(named.question, test, len(values), "all are zero", unit=named.unit)
+    found: Any = stats.wilcoxon(moved)
+    ranks = stats.rankdata(np.abs(moved))
+    signed = float(np.sum(ranks * np.sign(moved)) / np.sum(ranks))
+    zeros = len(values) - len(moved)
+    return Finding(
+        question=named.question,
+        test=test,
+        n=len(values),
+        unit=named.unit,
+        symbol="W",
+        statistic=float(found.statistic),
+        p=float(found.pvalue),
+        estimate=hodges_lehmann(values),
+        effect=Estimate(name="rank-biserial r", value=signed),
+        left_out=missing_text(zeros, "zeros", "they have no sign"),
+    )
+
+
+def hodges_lehmann(values: Floats) -> Estimate:
+    """Return the median of pairwise means, with the interval that belongs to the signed-rank test.
+
+    Hollander & Wolfe 1999, Nonparametric Statistical Methods, 3.3; exact without ties.
+
+    Args:
+        values: float64[n], n <= some hundreds: n^2 / 2 means are made.
+    """
+    n = len(values)
+    rows, columns = np.triu_indices(n)
+    walsh = np.sort((values[rows] + values[columns]) / 2.0)
+    below = int(np.searchsorted(np.cumsum(_rank_sum_weights(n)), TAIL, side="right"))
+    method = "signed ranks"
+    value = float(np.median(walsh))
+    if below == 0:  # even the whole range is no 95 % interval
+        return Estimate(name="Hodges-Lehmann", value=value)
+    low, high = float(walsh[below - 1]), float(walsh[len(walsh) - below])
+    return Estimate(name="Hodges-Lehmann", value=value, low=low, high=high, method=method)
+
+
+def pairwise(
+    cube: Floats, names: Sequence[str], question: str, unit: str = "mean difference"
+) -> tuple[Finding, ...]:
+    """Return paired tests of every two columns, Holm's correction over all of them.
+
+    Args:
+        cube: float64[n, k], a row a person; NaN where there is none.
+        names: str[k], of the columns.
+        question: begins each test's.
+        unit: name of the estimate.
+    """
+    found = [
+        paired(cube[:, a], cube[:, b], Named(f"{question}: {names[a]} - {names[b]}", unit))
+        for a, b in itertools.combinations(range(len(names)), 2)
+    ]
+    return holm(found)
+
+
+def holm(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Return the findings with p adjusted for how many were done (Holm 1979)."""
+    done = [k for k, finding in enumerate(findings) if finding.p is not None]
+    if len(done) < 2:
+        return tuple(findings)
+    adjusted: Any = multipletests([findings[k].p for k in done], method="holm")[1]
+    made = list(findings)
+    for k, p in zip(done, adjusted, strict=True):
+        made[k] = msgspec.structs.replace(made[k], p_adjusted=float(p), family=len(done))
+    return tuple(made)
+
+
+def normality(values: Floats, assumption: str) -> tuple[Check, ...]:
+    """Return Shapiro and Wilk's test, nothing where it cannot be done."""
+    if not FEWEST <= len(values) <= 5000 or _is_constant(values):
+        return ()
+    found: Any = stats.shapiro(values)
+    return (check(assumption, "Shapiro-Wilk", float(found.statistic), float(found.pvalue)),)
+
+
+def _is_constant(values: Floats) -> bool:
+    return float(np.ptp(values)) <= NOTHING_VARIES * max(1.0, float(np.max(np.abs(values))))
+
+
+def _rank_sum_weights(n: int) -> Floats:
+    """Return float64[n (n + 1) / 2 + 1], the null chance of each sum of positive ranks."""
+    weights = np.ones(1)
+    for rank in range(1, n + 1):
+        grown = np.zeros(len(weights) + rank)
+        grown[: len(weights)] += weights
+        grown[rank:] += weights
+        weights = grown / 2.0
+    assert math.isclose(float(weights.sum()), 1.0)
+    return weights
