@@ -75,7 +75,12 @@ def coefficients(cost: Coefficients) -> str:
         ("league", "an actor, a second", cost.league_actor_s, "renewals"),
         ("league", "an actor and an actor, a second", cost.league_pair_s, "what answers look at"),
         ("league", "a version", cost.league_version_s, "checks, commit, snapshot"),
-        ("league", "a version and an actor", cost.league_version_actor_s, "the schedule anew"),
+        (
+            "league",
+            "a version and an actor",
+            cost.league_version_actor_s,
+            "the list of leases anew",
+        ),
     )
     return table(
         ("Where", "For", "CPU, us", "What it is"),
@@ -88,7 +93,8 @@ def sizes(cost: Coefficients) -> str:
     rows = (
         ("a sample on the wire", f"{number(cost.rollout_bytes)} B"),
         ("a rollout of 128 bouts and 40 steps", f"{number(cost.rollout_bytes * 5120 / 1e6)} MB"),
-        ("a lease in the schedule", f"{number(cost.schedule_bytes)} B"),
+        ("the schedule", f"{number(cost.schedule_bytes)} B"),
+        ("a lease in the list of them", f"{number(cost.lease_bytes)} B"),
         ("an announced policy", f"{number(cost.policy_bytes / 1e3)} kB"),
         ("memory of the router, an actor", f"{number(cost.router_bytes_per_actor / 1e3)} kB"),
         ("memory of the league, an actor", f"{number(cost.league_bytes_per_actor / 1e3)} kB"),

@@ -10,19 +10,18 @@ from typing import Any
 import numpy as np
 from scipy.optimize import nnls
 
-from benchmarks.scaling.model import RESENDS, Coefficients
+from benchmarks.scaling.model import LEARNERS, RESENDS, Coefficients
 
 Run = dict[str, Any]
 LEAST_CPU = 0.01
 """CPU seconds a second below which an error counts as if it were of so much."""
 
 
-def fan_out(run: Run, schedule_bytes: float, policy_bytes: float) -> float:
-    """Return the bytes a second that the router delivered of values that go to every actor."""
+def fan_out(run: Run, schedule_bytes: float, lease_bytes: float, policy_bytes: float) -> float:
+    """Return the bytes a second that the router delivered of what league and learners publish."""
     actors, versions = run["actors"], run["versions_per_s"]
-    schedule = schedule_bytes * actors
-    again = RESENDS * (schedule + 2.0 * policy_bytes)
-    return actors * (again + versions * (schedule + policy_bytes))
+    again = RESENDS * (schedule_bytes + 2.0 * policy_bytes + LEARNERS * lease_bytes)
+    return actors * (again + versions * (schedule_bytes + policy_bytes))
 
 
 def solve(rows: Sequence[Sequence[float]], values: Sequence[float]) -> list[float]:
@@ -36,7 +35,7 @@ def solve(rows: Sequence[Sequence[float]], values: Sequence[float]) -> list[floa
 
 def fit(
     runs: Sequence[Run], *, actor_s: float, rollout_bytes: float, update_s: float,
-    schedule_bytes: float, policy_bytes: float,
+    schedule_bytes: float, lease_bytes: float, policy_bytes: float,
 ) -> Coefficients:  # fmt: skip
     """Return the coefficients that explain these runs.
 
@@ -45,7 +44,8 @@ def fit(
         actor_s: CPU seconds of a real actor for a sample.
         rollout_bytes: bytes of a sample.
         update_s: CPU seconds of PPO for a sample.
-        schedule_bytes: of the schedule for each lease.
+        schedule_bytes: of the schedule.
+        lease_bytes: of a lease in the list of them.
         policy_bytes: of an announced policy.
     """
     rollouts = [run["samples_per_s"] / run["rollout_samples"] for run in runs]
@@ -54,7 +54,7 @@ def fit(
     sent = [run["samples_per_s"] * rollout_bytes for run in runs]
     router = solve(
         [
-            (1.0, n, fan_out(run, schedule_bytes, policy_bytes), size, count)
+            (1.0, n, fan_out(run, schedule_bytes, lease_bytes, policy_bytes), size, count)
             for run, n, size, count in zip(runs, actors, sent, rollouts, strict=True)
         ],
         [run["router"] for run in runs],
@@ -93,6 +93,7 @@ def fit(
         league_version_s=league[3],
         league_version_actor_s=league[4],
         schedule_bytes=schedule_bytes,
+        lease_bytes=lease_bytes,
         policy_bytes=policy_bytes,
         router_bytes_per_actor=memory_slope(runs, "router-0"),
         league_bytes_per_actor=memory_slope(runs, "league-0"),

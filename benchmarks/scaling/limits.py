@@ -18,7 +18,7 @@ from benchmarks.scaling.words import number, table
 from services.learner.config import LearnerConfig
 from shared.bus.config import BusConfig, router_json
 from shared.bus.delivery import Applied, Outbox
-from shared.messages.topics import SCHEDULE
+from shared.messages.topics import LEASES
 from shared.messages.training import ACTION_DIM, OBS_DIM
 
 GIGABIT = 117e6
@@ -77,15 +77,14 @@ def limits(cost: Coefficients) -> str:
             "fewer bouts, or learners that fetch rollouts when they have room",
         ),
         (
-            "the schedule, sent to everybody",
+            "policies, sent to everybody",
             f"{half[GIGABIT]:,} actors take half of 1 Gbit/s, {half[TEN_GIGABIT]:,} half of "
-            f"10 Gbit/s; above {int(SCHEDULE.max_bytes / cost.schedule_bytes):,} leases it is "
-            "longer than its topic allows and learners hear nothing of new leases",
-            "every lease stands in it and every actor gets it every second: it grows with the "
-            "square of the actors",
+            "10 Gbit/s",
+            "both policies go to every actor every second, "
+            f"{number(2e-3 * cost.policy_bytes)} kB an actor for any number of them",
             "routers in a tree, one for each machine of actors (32 of them: "
             f"{number(broadcast(cost, tree, job, 5000)[0] / 1e6)} MB/s from the central one for "
-            "5,000 actors); a schedule for actors without the leases, which only learners read",
+            "5,000 actors)",
         ),
         (
             "the league's one thread",
@@ -96,7 +95,8 @@ def limits(cost: Coefficients) -> str:
         (
             "numbers in the code",
             f"{BOOTS:,} actor processes, restarts counted, in a learner's record of what was "
-            f"learned from; {SESSIONS:,} sessions at a router",
+            f"learned from; {SESSIONS:,} sessions at a router; "
+            f"{int(LEASES.max_bytes / cost.lease_bytes):,} leases in the list of them",
             "beyond the first, a rollout repeated by an actor that was silent longest could count "
             "twice",
             "a record that grows; routers in a tree",

@@ -31,7 +31,7 @@ from shared.bus.config import BusConfig
 from shared.bus.zenoh import open_zenoh
 from shared.clock import SystemClock
 from shared.errors import RiposteError
-from shared.messages.topics import POLICY, SCHEDULE
+from shared.messages.topics import LEASES, POLICY, SCHEDULE
 from shared.messages.wire import encode
 
 
@@ -86,7 +86,7 @@ class Found(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def message_sizes(site: ScalingSite) -> dict[str, float]:
-    """Return the bytes of the schedule for each lease, of a policy announced, of a sample.
+    """Return the bytes of the schedule, of a lease, of a policy announced, of a sample.
 
     Raises:
         RiposteError: nothing was announced.
@@ -94,17 +94,20 @@ def message_sizes(site: ScalingSite) -> dict[str, float]:
     clock = SystemClock()
     cfg = BusConfig(connect=(site.endpoint,), open_seconds=60.0, lease_seconds=30.0)
     with contextlib.closing(open_zenoh(cfg, "scale", clock, site.folder.name)) as bus:
-        schedules, policies = bus.subscribe(SCHEDULE), bus.subscribe(POLICY, agent="antagonist")
+        schedules, leases = bus.subscribe(SCHEDULE), bus.subscribe(LEASES)
+        policies = bus.subscribe(POLICY, agent="antagonist")
         found: dict[str, float] = {}
         end = clock.now() + START_SECONDS
-        while len(found) < 2 and clock.now() < end:
+        while len(found) < 3 and clock.now() < end:
             bus.wait(0.2)
-            if (schedule := schedules.take()) is not None and schedule.leases:
-                found["schedule_bytes"] = len(encode(schedule)) / len(schedule.leases)
+            if (schedule := schedules.take()) is not None:
+                found["schedule_bytes"] = float(len(encode(schedule)))
+            if (known := leases.take()) is not None and known.leases:
+                found["lease_bytes"] = len(encode(known)) / len(known.leases)
             if (policy := policies.take()) is not None:
                 found["policy_bytes"] = float(len(encode(policy)))
-    if len(found) < 2:
-        raise RiposteError("no schedule or no policy was heard of the site")
+    if len(found) < 3:
+        raise RiposteError("no schedule, no lease or no policy was heard of the site")
     return found | {"sample_bytes": site.sample_bytes}
 
 
@@ -275,5 +278,5 @@ def coefficients_of(fitted: list[dict[str, Any]], parts: dict[str, Any]) -> Coef
     return fit(
         fitted, actor_s=parts["actor_s"], rollout_bytes=most["sample_bytes"],
         update_s=parts["update_s"], schedule_bytes=most["schedule_bytes"],
-        policy_bytes=most["policy_bytes"],
+        lease_bytes=most["lease_bytes"], policy_bytes=most["policy_bytes"],
     )  # fmt: skip

@@ -14,6 +14,8 @@ import msgspec
 
 RESENDS = 1.0
 """A second; LATEST values are sent again so often (``bus.resend_seconds``)."""
+LEARNERS = 2
+"""One an agent; both hear whose rollouts may be learned from."""
 RENEWALS = 3.0
 """Renewals of a lease within its time."""
 
@@ -48,7 +50,7 @@ class Coefficients(msgspec.Struct, frozen=True, kw_only=True):
     router_rollout_s: float
     """The same for a rollout, whatever its size, and its answer."""
     router_fan_out_byte_s: float
-    """Of the router for a byte delivered of a value that goes to every actor."""
+    """Of the router for a byte delivered of a value that the league or a learner publishes."""
     router_actor_s: float
     """Of the router for an actor, a second: keep-alives, renewals, status."""
     league_s: float
@@ -60,9 +62,11 @@ class Coefficients(msgspec.Struct, frozen=True, kw_only=True):
     league_version_s: float
     """Of the league for a version: checks, commit, snapshot."""
     league_version_actor_s: float
-    """The same for each actor in it: the schedule is made and sent anew."""
+    """The same for each actor in it: the list of leases is looked through."""
     schedule_bytes: float
-    """Of the schedule for each lease."""
+    """Of the schedule, which every actor hears."""
+    lease_bytes: float
+    """Of a lease in the list that the learners hear."""
     policy_bytes: float
     """Of an announced policy."""
     router_bytes_per_actor: float
@@ -159,14 +163,10 @@ class Prediction:
         return next(load for load in self.loads if load.name == name)
 
 
-def schedule_size(found: Coefficients, actors: int) -> float:
-    """Return the bytes of the schedule with a lease for each actor."""
-    return found.schedule_bytes * actors
-
-
 def router(found: Coefficients, site: Site, job: Job, actors: int) -> tuple[float, float]:
     """Return the central router's CPU seconds: a second, and a sample."""
     fan_out, fan_out_sample = broadcast(found, site, job, actors)
+    fan_out += LEARNERS * RESENDS * found.lease_bytes * actors
     sessions = actors if not site.relays else site.relays
     return (
         found.router_s + found.router_actor_s * sessions + found.router_fan_out_byte_s * fan_out,
@@ -183,11 +183,10 @@ def broadcast(found: Coefficients, site: Site, job: Job, actors: int) -> tuple[f
     and the policy of one agent.
     """
     ends = site.relays or actors
-    schedule = schedule_size(found, actors)
     versions = 1.0 / job.batch_samples
     return (
-        ends * RESENDS * (schedule + 2.0 * found.policy_bytes),
-        ends * versions * (schedule + found.policy_bytes),
+        ends * RESENDS * (found.schedule_bytes + 2.0 * found.policy_bytes),
+        ends * versions * (found.schedule_bytes + found.policy_bytes),
     )
 
 

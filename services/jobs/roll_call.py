@@ -5,9 +5,9 @@ import dataclasses
 from services.jobs.status_view import Heard, Missing, Snapshot, lags
 from shared.bus.base import Bus
 from shared.clock import Clock
-from shared.messages.league import Schedule
+from shared.messages.league import Leases
 from shared.messages.live import Progress, ServiceStatus
-from shared.messages.topics import PROGRESS, SCHEDULE, SERVICE_ROLES, STATUS
+from shared.messages.topics import LEASES, PROGRESS, SERVICE_ROLES, STATUS
 
 MOST_PROCESSES = 20_000
 """That are kept; one heard longest ago goes first."""
@@ -31,10 +31,10 @@ class RollCall:
         self._clock = clock
         self._statuses = bus.subscribe(STATUS)
         self._progress_said = bus.subscribe(PROGRESS)
-        self._schedules = bus.subscribe(SCHEDULE)
+        self._leases_said = bus.subscribe(LEASES)
         self._rows: dict[tuple[str, str], _Row] = {}
         self._progress: Progress | None = None
-        self._schedule: Schedule | None = None
+        self._leases: Leases | None = None
         self._alive()  # what lives is told from the first question on
 
     def listen(self, seconds: float) -> None:
@@ -61,7 +61,7 @@ class RollCall:
 
     def close(self) -> None:
         """Stop listening."""
-        for subscription in (self._statuses, self._progress_said, self._schedules):
+        for subscription in (self._statuses, self._progress_said, self._leases_said):
             subscription.close()
 
     def _take(self) -> None:
@@ -70,8 +70,8 @@ class RollCall:
             self._hear(status, now)
         while (progress := self._progress_said.take()) is not None:
             self._progress = progress
-        while (schedule := self._schedules.take()) is not None:
-            self._schedule = schedule
+        while (leases := self._leases_said.take()) is not None:
+            self._leases = leases
         for key in [k for k, row in self._rows.items() if now - row.heard_at > FORGET_SECONDS]:
             del self._rows[key]
         while len(self._rows) > MOST_PROCESSES:
@@ -88,7 +88,7 @@ class RollCall:
         """Return who is on the bus, or holds a lease, and says nothing."""
         heard = {(role.replace("-", "_"), name) for role, name in self._rows}
         found = dict.fromkeys(self._alive(), "is on the bus and says nothing")
-        leases = self._schedule.leases if self._schedule is not None else ()
+        leases = self._leases.leases if self._leases is not None else ()
         for lease in leases:
             found.setdefault(("actor", lease.actor), f"had lease {lease.lease} a moment ago")
         return tuple(

@@ -2,5 +2,5 @@
 
 Reads nothing by itself. Answers ``league/lease``, ``league/renewal``, ``league/results``,
 ``league/version``, ``league/incident``, ``league/snapshot`` and ``league/settings``; writes
-``league/schedule`` and ``league/progress``.
+``league/schedule``, ``league/leases`` and ``league/progress``.
 """

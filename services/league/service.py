@@ -24,6 +24,7 @@ from shared.messages.league import (
     Lease,
     LeaseRenewal,
     LeaseRequest,
+    Leases,
     LeaseStatus,
     RunSettings,
     Schedule,
@@ -35,6 +36,7 @@ from shared.messages.message import Message
 from shared.messages.topics import (
     INCIDENT,
     LEASE,
+    LEASES,
     PROGRESS,
     RENEWAL,
     RESULTS,
@@ -96,6 +98,7 @@ class League:
         )
         self._desk = Desk(cfg, self._journal, self._store, clock, self._rules, serial=serial)
         self._schedule: Schedule | None = None
+        self._leases: Leases | None = None
         self._schedule_due_at = self._progress_due_at = clock.now()
         self._incidents: Inbox[Incident, Receipt] = bus.answer(INCIDENT)
         self._results: Inbox[BoutResults, Receipt] = bus.answer(RESULTS)
@@ -129,7 +132,7 @@ class League:
         """
         self._journal.rewind(position)
         self._desk.restart()
-        self._schedule = None
+        self._schedule = self._leases = None
 
     def tick(self) -> bool:
         """Take what has arrived, commit, answer, publish; return whether anything was done."""
@@ -239,24 +242,28 @@ class League:
         now = self._clock.now()
         if self._journal.uncommitted or now >= self._schedule_due_at:
             self._schedule_due_at = now + PERIOD
-            current = self._current_schedule()
-            if current != self._schedule:
-                self._schedule = current
-                self._bus.publish(SCHEDULE, current)
+            self._publish_schedule()
         if now >= self._progress_due_at:
             self._progress_due_at = now + PERIOD
             steps, message = self._rules.bout_steps, self._desk.message
             self._bus.publish(PROGRESS, progress_of(self._cfg, self.state, steps, message))
 
-    def _current_schedule(self) -> Schedule:
+    def _publish_schedule(self) -> None:
+        """Say what has changed; what has not the bus says again."""
         state = self.state
         record = state.stage
-        return Schedule(
+        schedule = Schedule(
             stage=record.stage if record is not None else None,
-            leases=leases.summaries(state, self._cfg, self._journal.at_ns),
             versions=self._newest_versions(),
             finished=state.finished,
         )
+        if schedule != self._schedule:
+            self._schedule = schedule
+            self._bus.publish(SCHEDULE, schedule)
+        live = Leases(leases=leases.summaries(state, self._cfg, self._journal.at_ns))
+        if live != self._leases:
+            self._leases = live
+            self._bus.publish(LEASES, live)
 
     def _newest_versions(self) -> dict[str, int]:
         state = self.state

@@ -1,5 +1,5 @@
 """One agent's PPO: rollouts in, policy versions out.
 
 Answers ``learner/{agent}/rollout``; asks ``league/version``; publishes ``learner/{agent}/policy``;
-reads ``league/schedule``. The only room with torch and rsl_rl.
+reads ``league/schedule`` and ``league/leases``. The only room with torch and rsl_rl.
 """

@@ -69,7 +69,7 @@ def check_provenance(
         return Ruling(Decision.DROP, f"stage {rollout.stage} is over")
     lease = leases.get(rollout.lease)
     if lease is None:
-        return Ruling(Decision.LATER, f"unknown bout: lease {rollout.lease} is not in the schedule")
+        return Ruling(Decision.LATER, f"unknown bout: lease {rollout.lease} is not known here yet")
     for field in ("actor", "agent", "stage", "opponent", "seed"):
         if (found := getattr(rollout, field)) != (wanted := getattr(lease, field)):
             what = "mixed opponents" if field == "opponent" else f"wrong {field}"

@@ -21,7 +21,7 @@ from shared.bus.base import Inbox, Request
 from shared.bus.delivery import Applied
 from shared.clock import Clock
 from shared.game.rules import RuleBook
-from shared.messages.league import LeaseSummary, Schedule, Stage
+from shared.messages.league import Leases, LeaseSummary, Schedule, Stage
 from shared.messages.training import Agent, Receipt, Rollout
 
 log = structlog.get_logger()
@@ -105,10 +105,13 @@ class Intake:
     def follow(self, schedule: Schedule) -> None:
         """Take over what the league says; rollouts of a stage that is over are let go."""
         self.stage = schedule.stage
-        self._leases = {lease.lease: lease for lease in schedule.leases}
-        self._seen = {name: seen for name, seen in self._seen.items() if name in self._leases}
         if not self.in_turn:
             self.release("the stage is over")
+
+    def know(self, leases: Leases) -> None:
+        """Take over whose rollouts may be learned from."""
+        self._leases = {lease.lease: lease for lease in leases.leases}
+        self._seen = {name: seen for name, seen in self._seen.items() if name in self._leases}
 
     def end_stage(self) -> None:
         """The league has ended the stage; what comes next it will say."""

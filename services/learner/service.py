@@ -25,7 +25,7 @@ from shared.clock import Clock
 from shared.errors import RiposteError
 from shared.messages.league import Incident
 from shared.messages.message import Bytes
-from shared.messages.topics import INCIDENT, POLICY, ROLLOUT, SCHEDULE, VERSION
+from shared.messages.topics import INCIDENT, LEASES, POLICY, ROLLOUT, SCHEDULE, VERSION
 from shared.messages.training import (
     Agent,
     PolicyAnnouncement,
@@ -87,6 +87,7 @@ class Learner:
             bus.answer(ROLLOUT, agent=agent), clock, cfg, agent, facts.fit.model or "", facts.rules
         )
         self._schedule = bus.subscribe(SCHEDULE)
+        self._leases = bus.subscribe(LEASES)
         self._reports: Outbox[VersionReport, VersionReceipt] = Outbox(
             bus, VERSION, clock, window=1, timeout=REPORT_TIMEOUT
         )
@@ -163,6 +164,9 @@ class Learner:
 
     def _take_schedule(self) -> bool:
         did = False
+        while (leases := self._leases.take()) is not None:
+            did = True
+            self._intake.know(leases)
         while (schedule := self._schedule.take()) is not None:
             did = True
             was_in_turn = self._intake.in_turn

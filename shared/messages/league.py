@@ -100,13 +100,18 @@ class LeaseSummary(Message, frozen=True, kw_only=True):
     seed: int
 
 
+class Leases(Message, frozen=True, kw_only=True):
+    """Who may hand rollouts over; grows with the actors, so that actors do not hear it."""
+
+    leases: tuple[LeaseSummary, ...]
+    """Training leases that are alive, and those ended a moment ago."""
+
+
 class Schedule(Message, frozen=True, kw_only=True):
-    """Where the run stands; re-sent every second until it changes."""
+    """Where the run stands; everybody hears it, so that it is as long for any number of actors."""
 
     stage: Stage | None
     """None between stages and while evaluations are played."""
-    leases: tuple[LeaseSummary, ...]
-    """Training leases that are alive, and those ended a moment ago."""
     versions: dict[str, int]
     """Newest version of each agent in the ledger."""
     finished: bool = False

@@ -10,6 +10,7 @@ from shared.messages.league import (
     Lease,
     LeaseRenewal,
     LeaseRequest,
+    Leases,
     LeaseStatus,
     RunSettings,
     Schedule,
@@ -154,8 +155,12 @@ POLICY = Topic(
     "the version to act with",
 )
 SCHEDULE = Topic(
-    "league/schedule", Schedule, Qos.LATEST, 1 * MIB, ("league",),
-    ("actor", "learner", "recorder", "operator"), "stage, leases and versions",
+    "league/schedule", Schedule, Qos.LATEST, 64 * KIB, ("league",),
+    ("actor", "learner", "recorder", "operator"), "stage and versions",
+)
+LEASES = Topic(
+    "league/leases", Leases, Qos.LATEST, 8 * MIB, ("league",), ("learner", "operator"),
+    "whose rollouts may be learned from",
 )
 PROGRESS = Topic(
     "league/progress", Progress, Qos.LATEST, 64 * KIB, ("league",),
@@ -236,6 +241,6 @@ SERVICES: tuple[Service[Any, Any], ...] = (
     ARM,
 )
 TOPICS: tuple[Topic[Any], ...] = (
-    POLICY, SCHEDULE, PROGRESS, STATUS, FRAMES, BATS, ARMS, ROBOT, TRACKER, TRACKER_RAW, OFFSET,
-    REFEREE, GATE, HEART_RATE,
+    POLICY, SCHEDULE, LEASES, PROGRESS, STATUS, FRAMES, BATS, ARMS, ROBOT, TRACKER, TRACKER_RAW,
+    OFFSET, REFEREE, GATE, HEART_RATE,
 )  # fmt: skip

@@ -28,7 +28,7 @@ REQUEST = LeaseRequest(actor="actor-0", boot="b0", num_envs=4)
 
 
 def a_schedule(version: int) -> Schedule:
-    return Schedule(stage=None, leases=(), versions={"antagonist": version})
+    return Schedule(stage=None, versions={"antagonist": version})
 
 
 def a_status(name: str) -> ServiceStatus:

@@ -35,7 +35,7 @@ REQUEST = LeaseRequest(actor="hold", boot="b0", num_envs=4)
 
 
 def a_schedule(version: int) -> Schedule:
-    return Schedule(stage=None, leases=(), versions={"antagonist": version})
+    return Schedule(stage=None, versions={"antagonist": version})
 
 
 def a_rollout(sequence: int, steps: int = 40, worlds: int = 128) -> Rollout:

@@ -32,7 +32,7 @@ def endpoint() -> Iterator[str]:
         leagues = [open_zenoh(cfg, "league-0", SystemClock(), run) for run in ("one", "two")]
         for league in leagues:
             stack.enter_context(contextlib.closing(league))
-            league.publish(SCHEDULE, Schedule(stage=None, leases=(), versions={}))
+            league.publish(SCHEDULE, Schedule(stage=None, versions={}))
             said = ServiceStatus(
                 role="league", name="league-0", boot=league.boot, pid=1, host="h", state="up"
             )

@@ -171,7 +171,7 @@ class Hall:
         )
 
     def schedule(self, stage: Stage | None) -> None:
-        self.league.publish(SCHEDULE, Schedule(stage=stage, leases=(), versions={}))
+        self.league.publish(SCHEDULE, Schedule(stage=stage, versions={}))
 
     def store(self, made: Snapshot) -> str:
         """Put a snapshot into the league's store and return its reference."""

@@ -1,16 +1,18 @@
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import pytest
 
 from services.league.history import RunState
 from services.league.ledger import open_read_only
-from shared.bus.base import Refused
+from shared.bus.base import Refused, Subscription
 from shared.errors import LedgerError
-from shared.messages.league import Lease, Schedule, SnapshotRequest
-from shared.messages.topics import LEASE, PROGRESS, RESULTS, SCHEDULE, SNAPSHOT, VERSION
+from shared.messages.league import Lease, Leases, SnapshotRequest
+from shared.messages.message import Message
+from shared.messages.topics import LEASE, LEASES, PROGRESS, RESULTS, SCHEDULE, SNAPSHOT, VERSION
 from tests.unit.league.driving import (
     SAMPLES,
     SMALL,
@@ -278,9 +280,9 @@ def test_an_actor_that_asks_again_gets_a_new_lease_and_its_old_one_ends(match: M
     assert list(match.league.state.live_leases) == [three.lease]
 
 
-def test_leases_of_a_finished_stage_end_and_stay_in_the_schedule_for_a_while(match: Match) -> None:
+def test_leases_of_a_finished_stage_end_and_are_known_for_a_while(match: Match) -> None:
     match.both_start()
-    schedule = match.peer.subscribe(SCHEDULE)
+    known = match.peer.subscribe(LEASES)
     lease = match.lease()
     for version in (1, 2, 3):
         match.report("antagonist", version, 0)
@@ -288,8 +290,8 @@ def test_leases_of_a_finished_stage_end_and_stay_in_the_schedule_for_a_while(mat
 
     def leases() -> list[str]:
         match.league.tick()
-        newest: Schedule | None = None
-        while (value := schedule.take()) is not None:
+        newest: Leases | None = None
+        while (value := known.take()) is not None:
             newest = value
         assert newest is not None
         return [summary.lease for summary in newest.leases]
@@ -297,6 +299,30 @@ def test_leases_of_a_finished_stage_end_and_stay_in_the_schedule_for_a_while(mat
     assert leases() == [lease.lease]
     match.clock.advance(5.1)
     assert leases() == []
+
+
+def test_what_every_actor_hears_is_as_long_for_any_number_of_actors(match: Match) -> None:
+    match.both_start()
+    schedule, known = match.peer.subscribe(SCHEDULE), match.peer.subscribe(LEASES)
+    match.lease("actor-0")
+    assert newest(schedule, match) is not None
+    for number in range(1, 20):
+        match.lease(f"actor-{number}")
+    assert newest(schedule, match) is None  # there is nothing new to tell an actor
+    live = newest(known, match)
+    assert live is not None
+    assert len(live.leases) == 20
+
+
+M = TypeVar("M", bound=Message)
+
+
+def newest(subscription: Subscription[M], match: Match) -> M | None:
+    match.league.tick()
+    found: M | None = None
+    while (value := subscription.take()) is not None:
+        found = value
+    return found
 
 
 def evaluation(match: Match) -> None:

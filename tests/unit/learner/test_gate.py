@@ -61,7 +61,7 @@ def test_a_rollout_from_elsewhere_is_dropped_with_the_reason(changes: Any, reaso
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
-        ({"lease": "L000009"}, "unknown bout: lease L000009 is not in the schedule"),
+        ({"lease": "L000009"}, "unknown bout: lease L000009 is not known here yet"),
         ({"stage": 1}, "stage 1 is not known here yet"),
     ],
 )

@@ -18,9 +18,9 @@ from shared.bus.memory import MemoryHub
 from shared.clock import ManualClock
 from shared.errors import CheckpointError, RiposteError
 from shared.game.rules import RuleBook
-from shared.messages.league import Incident, LeaseSummary, Schedule, Stage
+from shared.messages.league import Incident, Leases, LeaseSummary, Schedule, Stage
 from shared.messages.message import Message
-from shared.messages.topics import INCIDENT, POLICY, ROLLOUT, SCHEDULE, VERSION, Service
+from shared.messages.topics import INCIDENT, LEASES, POLICY, ROLLOUT, SCHEDULE, VERSION, Service
 from shared.messages.training import (
     PolicyAnnouncement,
     Receipt,
@@ -67,7 +67,8 @@ class Table:
     def schedule(
         self, stage: Stage | None = STAGE, leases: tuple[LeaseSummary, ...] = (LEASE,)
     ) -> None:
-        self.league.publish(SCHEDULE, Schedule(stage=stage, leases=leases, versions={}))
+        self.league.publish(SCHEDULE, Schedule(stage=stage, versions={}))
+        self.league.publish(LEASES, Leases(leases=leases))
         self.learner.tick()
 
     def report(self) -> Request[VersionReport, VersionReceipt]:

@@ -123,7 +123,7 @@ def test_curves_and_events_of_training_are_recorded(tmp_path: Path) -> None:
         index=1, phase="one", iteration=1, agent="protagonist", opponent="sha256:" + "cd" * 32,
         max_updates=100, score_weight=1.0, shaping_weight=0.0,
     )  # fmt: skip
-    stand.bus.publish(SCHEDULE, Schedule(stage=stage, leases=(), versions={"antagonist": 5}))
+    stand.bus.publish(SCHEDULE, Schedule(stage=stage, versions={"antagonist": 5}))
     stand.progress(1, 1)
     stand.run(1.0)
     stand.recorder.close()

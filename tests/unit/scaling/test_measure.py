@@ -30,7 +30,8 @@ def kept_run(setup: Setup, purpose: str, crowd: Crowd) -> dict[str, Any]:
         "offered_per_s": crowd.rollouts_per_s * setup.rollout_samples, "hosts": 0.5,
         "learner": run["learner_thread"] + run["learner_threads"], "dropped_per_s": 0.0,
         "bytes_out_per_s": 1.0, "memory": [memory] if purpose == "memory" else [],
-        "schedule_bytes": PLANTED.schedule_bytes, "policy_bytes": PLANTED.policy_bytes,
+        "schedule_bytes": PLANTED.schedule_bytes, "lease_bytes": PLANTED.lease_bytes,
+        "policy_bytes": PLANTED.policy_bytes,
         "sample_bytes": PLANTED.rollout_bytes,
     }  # fmt: skip
 

@@ -24,7 +24,7 @@ PLANTED = Coefficients(
     ingest_threads_s=1.5e-7, update_s=12e-6, version_s=6e-3, router_s=1e-3, router_byte_s=1.2e-9,
     router_rollout_s=1e-4, router_fan_out_byte_s=4e-10, router_actor_s=5e-5, league_s=8e-3,
     league_actor_s=1e-4, league_pair_s=2e-8, league_version_s=3e-3, league_version_actor_s=4e-6,
-    schedule_bytes=190.0, policy_bytes=33_000.0, router_bytes_per_actor=9e4,
+    schedule_bytes=300.0, lease_bytes=190.0, policy_bytes=33_000.0, router_bytes_per_actor=9e4,
     league_bytes_per_actor=2e3, learner_bytes_per_actor=500.0,
 )  # fmt: skip
 
@@ -53,15 +53,15 @@ def test_actors_that_share_the_machine_share_its_cores():
 
 
 def test_a_link_carries_rollouts_one_way_and_everybodys_values_the_other():
-    found = priced(rollout_bytes=100.0, policy_bytes=1000.0, schedule_bytes=10.0)
+    found = priced(rollout_bytes=100.0, policy_bytes=1000.0, schedule_bytes=10.0, lease_bytes=5.0)
     site = Site(actor_cores=math.inf, link=1e6)
     few = predict(found, site, Job(batch_samples=10**9), 2)
     assert (few.bottleneck, few.samples_per_s) == ("link, in", pytest.approx(10_000))
-    assert few.load("link, out").standing == pytest.approx(2 * (2 * 10 + 2 * 1000))
-    many = predict(found, site, Job(batch_samples=10**9), 1000)  # 1000 x (10 kB + 2 kB) a second
+    assert few.load("link, out").standing == pytest.approx(2 * (10 + 2 * 1000))
+    many = predict(found, site, Job(batch_samples=10**9), 1000)  # 1000 x 2 kB a second
     assert (many.bottleneck, many.samples_per_s) == ("link, out", 0.0)
     relayed = predict(found, dataclasses.replace(site, relays=10), Job(batch_samples=10**9), 1000)
-    assert relayed.load("link, out").standing == pytest.approx(10 * (10_000 + 2000))
+    assert relayed.load("link, out").standing == pytest.approx(10 * (10 + 2000))
 
 
 def test_ppo_left_out_costs_nothing_and_a_larger_batch_spreads_a_version():
@@ -130,8 +130,8 @@ def test_planted_coefficients_are_found_again():
         )
     ]  # fmt: skip
     found = fit(
-        runs, actor_s=8e-6, rollout_bytes=168.0, update_s=12e-6, schedule_bytes=190.0,
-        policy_bytes=33_000.0,
+        runs, actor_s=8e-6, rollout_bytes=168.0, update_s=12e-6, schedule_bytes=300.0,
+        lease_bytes=190.0, policy_bytes=33_000.0,
     )  # fmt: skip
     for name in Coefficients.__struct_fields__:
         assert getattr(found, name) == pytest.approx(getattr(PLANTED, name), rel=1e-3), name

@@ -11,9 +11,9 @@ from services.jobs.status_view import Heard, Snapshot, headline, lags, render
 from shared.bus.memory import MemoryHub
 from shared.clock import ManualClock, SystemClock
 from shared.errors import ConfigError
-from shared.messages.league import LeaseSummary, Schedule
+from shared.messages.league import Leases, LeaseSummary
 from shared.messages.live import Progress, ServiceStatus
-from shared.messages.topics import PROGRESS, SCHEDULE, STATUS
+from shared.messages.topics import LEASES, PROGRESS, STATUS
 
 
 class PassingClock(ManualClock):
@@ -101,7 +101,7 @@ def test_who_has_fallen_silent_and_who_was_never_heard_is_said():
     lease = LeaseSummary(
         lease="L2", actor="actor-2", agent="antagonist", stage=0, opponent="x", seed=1
     )
-    league.publish(SCHEDULE, Schedule(stage=None, leases=(lease,), versions={}))
+    league.publish(LEASES, Leases(leases=(lease,)))
     call.listen(0.5)
     clock.advance(20.0)
     snapshot = call.snapshot()
