@@ -1,0 +1,93 @@
+"""Draws the orders of a study, and writes them beside the key that tells what the labels mean."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+import tomli_w
+
+from shared.clock import Clock
+from shared.errors import StudyError
+from shared.runtime.files import atomic_write
+from shared.study.allocation import Allocation, allocate
+from shared.study.folder import (
+    ALLOCATION,
+    KEY,
+    AllocationRow,
+    Study,
+    hash_of,
+    note_change,
+    open_study,
+    read_key,
+    read_own_protocol,
+)
+from shared.study.protocol import Protocol
+from shared.study.tsv import read_table, write_table
+
+_KEY_HEADING: Final = """\
+# What the labels of this study mean. Who analyses blinded must not read this file.
+# Written by `riposte study allocate`.
+
+"""
+
+
+def draw_orders(folder: Path, people: int, seed: int, clock: Clock) -> Study:
+    """Draw labels and orders of a study, or more orders of the same seed; return the study.
+
+    Raises:
+        ConfigError: as ``open_study``.
+        StudyError: there are orders already, and they are not those of this seed.
+    """
+    data, protocol = read_own_protocol(folder)
+    made = allocate(protocol, people, seed)
+    there = read_table(folder / ALLOCATION, AllocationRow)
+    rows = [
+        AllocationRow(participant=name, order=",".join(order)) for name, order in made.assignments
+    ]
+    if there:
+        rows = _extended(folder, there, rows, made, seed)
+    key = _key(protocol, hash_of(data), made, seed)
+    note_change(folder, f"orders drawn: {len(rows)} participants are expected", clock)
+    atomic_write(folder / KEY, (_KEY_HEADING + tomli_w.dumps(key)).encode(), mode=0o600)
+    write_table(folder / ALLOCATION, rows, AllocationRow)
+    return open_study(folder)
+
+
+def _extended(
+    folder: Path, there: list[AllocationRow], rows: list[AllocationRow], made: Allocation,
+    seed: int,
+) -> list[AllocationRow]:  # fmt: skip
+    """Return the rows that are there and those that come after them.
+
+    Raises:
+        StudyError: what is there was not drawn from this protocol and seed.
+    """
+    key = read_key(folder)
+    meant = {label: entry.condition for label, entry in key.label.items()} if key else {}
+    by_name = {row.participant: row for row in rows}
+    is_same = key is not None and key.seed == seed and meant == made.labels
+    if not is_same or any(by_name.get(row.participant, row) != row for row in there):
+        raise StudyError(
+            f"{folder / ALLOCATION} holds other orders: draw more people with the seed it was "
+            f"drawn with (in {KEY}); to begin anew, as long as nobody has played, delete "
+            f"{ALLOCATION} and {KEY}"
+        )
+    last = max(_number(row.participant) for row in there)
+    return [*there, *(row for row in rows if _number(row.participant) > last)]
+
+
+def _number(participant: str) -> int:
+    return int(participant.removeprefix("sub-"))
+
+
+def _key(protocol: Protocol, digest: str, made: Allocation, seed: int) -> Mapping[str, object]:
+    return {
+        "schema": 1,
+        "study": protocol.name,
+        "seed": seed,
+        "protocol": digest,
+        "label": {
+            label: {"condition": name, "player": protocol.condition_named(name).player}
+            for label, name in made.labels.items()
+        },
+    }
