@@ -62,7 +62,7 @@ class VirtualSite:
         self, folder: Path, robot: RobotIoConfig, safety: SafetyConfig, sim: SimConfig, *,
         rules: RuleBook | None = None, policy: PolicyConfig | None = None,
         heart: HeartRateSource | None = None, recorder: RecorderConfig | None = None,
-        began: float = BEGAN,
+        clock: ManualClock | None = None,
     ) -> None:  # fmt: skip
         """Start them.
 
@@ -75,9 +75,9 @@ class VirtualSite:
             policy: of the robot's player; where there is none, somebody else moves the robot.
             heart: the strap of the person who plays, if one is worn.
             recorder: what is recorded; by default everything but the live view.
-            began: what both clocks show at first (s).
+            clock: that the site moves on; one of its own where none is given.
         """
-        self.clock = ManualClock(began)
+        self.clock = clock or ManualClock(BEGAN)
         hub = MemoryHub(self.clock, max_messages=4096)
         self._hub = hub
         folder.mkdir(parents=True, exist_ok=True)

@@ -7,12 +7,12 @@ from shared.policy.scripted.person import CLEAREST, Character
 
 BEGINNER: Final = Character(
     tactic=CLEAREST, sight_seconds=0.25, hearing_seconds=0.22, anticipation=0.0, lead=0.0,
-    peak_speed=1.2, noise=0.25, spread=0.12, caution=0.0, pause=(0.5, 1.2),
+    peak_speed=1.2, noise=0.25, spread=0.12, caution=0.0, pause=(0.3, 0.8),
 )  # fmt: skip
 """Nothing learned of either faculty."""
 MASTER: Final = Character(
-    tactic=CLEAREST, sight_seconds=0.20, hearing_seconds=0.17, anticipation=1.0, lead=0.03,
-    peak_speed=2.4, noise=0.08, spread=0.08, caution=0.12, pause=(0.1, 0.4),
+    tactic=CLEAREST, sight_seconds=0.20, hearing_seconds=0.17, anticipation=1.0, lead=0.15,
+    peak_speed=3.0, noise=0.08, spread=0.08, caution=0.12, pause=(0.3, 0.8),
 )  # fmt: skip
 """Everything learned of both."""
 READING: Final = ("sight_seconds", "anticipation", "lead", "caution")
@@ -37,8 +37,4 @@ def character_at(body: float, reading: float) -> Character:
             "spread", "caution",
         )
     }  # fmt: skip
-    low, high = (
-        between("pause", start, end)
-        for start, end in zip(BEGINNER.pause, MASTER.pause, strict=True)
-    )
-    return dataclasses.replace(BEGINNER, **numbers, pause=(low, high))
+    return dataclasses.replace(BEGINNER, **numbers)
