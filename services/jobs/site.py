@@ -37,6 +37,7 @@ DECLARED = {
     "heart_rate": "services.robot_io.heart_rate.source:HeartRateConfig",
     "tones": "services.robot_io.tones.tones:TonesConfig",
     "page": "services.page.config:PageConfig",
+    "study": "services.study.config:StudyConfig",
     "metrics": "services.metrics.config:MetricsConfig",
     "play": "services.jobs.play.config:PlayConfig",
     "train": "services.jobs.settings:TrainConfig",

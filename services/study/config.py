@@ -19,7 +19,7 @@ class StudyConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     host: str = "127.0.0.1"
     """Interface of the pages."""
     port: int = 8770
-    """Of the pages; 0 takes any that is free (``study.json`` in the session's folder says which)."""
+    """Of the pages; 0 takes any that is free (``study.json`` beside the journal says which)."""
     origins: tuple[str, ...] = ()
     """Further addresses that the pages may be opened under, such as http://lab-pc:8770."""
     countdown: float = 3.0

@@ -173,8 +173,7 @@ class Session:
     # -- resuming ---------------------------------------------------------------------------
 
     def _resume(self) -> None:
-        steps = {step.id for step in self.plan.steps}
-        self.plan.check(self.progress, steps)
+        self.plan.check(self.progress)
         self.write(self.plan.resumed)
         if (running := self.progress.running) is not None:
             step, attempt = running

@@ -22,7 +22,7 @@ Table = dict[str, Any]
 SECTIONS = (
     "bus", "sim", "game", "action", "reward",
     "site", "actor", "learner", "league", "recorder", "policy", "referee", "robot_io", "safety",
-    "pr2", "vive", "heart_rate", "tones", "page", "metrics", "play",
+    "pr2", "vive", "heart_rate", "tones", "page", "study", "metrics", "play",
     "train",
 )  # fmt: skip
 """Every section a site file may have; each service reads its own."""
