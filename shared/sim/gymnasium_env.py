@@ -13,50 +13,11 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from shared.game.bout import Judgement
-from shared.game.reward import reward
-from shared.messages.training import OBS_DIM
+from shared.sim.bouts import Bouts
 from shared.sim.render import SceneRenderer
-from shared.sim.task import SIDES, Float32s, Opponent, Side, Task, observe
+from shared.sim.task import Float32s, Opponent, Side, Task
 
 _FRAMES_PER_SECOND = 100
-_CHECK_EVERY = 40
-"""Steps between two looks at whether the physics is still finite."""
-
-
-class _Bouts:
-    """N bouts seen from one side."""
-
-    def __init__(
-        self, task: Task, agent: Side, opponent: Opponent, num_envs: int, num_threads: int
-    ) -> None:
-        self.task = task
-        self.side = SIDES.index(agent)
-        self.env = task.worlds(num_envs, num_threads)
-        self.player = task.player(opponent, self.env)
-        scale = self.player.offset_scale
-        self.env.offset_scales = (1.0, scale) if self.side == 0 else (scale, 1.0)
-        self._others = np.zeros((num_envs, OBS_DIM), np.float32)
-        self._steps = 0
-
-    def observe(self) -> Float32s:
-        """Return float32[N, 27], what the learning side sees now, in a new array."""
-        seen = observe(self.env)
-        self._others = seen[1 - self.side]
-        return seen[self.side]
-
-    def step(
-        self, actions: Float32s, generator: np.random.Generator
-    ) -> tuple[NDArray[np.float64], Judgement]:
-        """Carry out one step since the last look; return float64[N] rewards and the judgement."""
-        other = self.player.act(self._others, generator)
-        pair = (actions, other) if self.side == 0 else (other, actions)
-        judgement = self.env.step(*pair)
-        self._steps += 1
-        if self._steps % _CHECK_EVERY == 0:
-            self.env.batch.check()
-        task = self.task
-        paid = reward(self.side, judgement, task.score_weight, task.shaping_weight, task.reward)
-        return paid, judgement
 
 
 class FencingSingleEnv(gymnasium.Env[Float32s, Float32s]):
@@ -89,7 +50,7 @@ class FencingSingleEnv(gymnasium.Env[Float32s, Float32s]):
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f'render_mode must be None or "rgb_array", got {render_mode!r}')
         task = task or Task()
-        self._bouts = _Bouts(task, agent, opponent, num_envs=1, num_threads=1)
+        self._bouts = Bouts(task, agent, opponent, num_envs=1, num_threads=1)
         self._renderer: SceneRenderer | None = None
         self.render_mode = render_mode
         self.observation_space = task.observation_space()
@@ -170,7 +131,7 @@ class FencingVectorEnv(gymnasium.vector.VectorEnv[Float32s, Float32s, NDArray[An
             SnapshotError: if there is no such opponent, or it does not fit this game.
         """
         task = task or Task()
-        self._bouts = _Bouts(task, agent, opponent, num_envs, num_threads)
+        self._bouts = Bouts(task, agent, opponent, num_envs, num_threads)
         self._staggered = staggered
         self.num_envs = num_envs
         observations, actions = task.observation_space(), task.action_space()
@@ -183,28 +144,19 @@ class FencingVectorEnv(gymnasium.vector.VectorEnv[Float32s, Float32s, NDArray[An
     ) -> tuple[Float32s, dict[str, Any]]:
         """Start every bout; ``options`` are not used."""
         super().reset(seed=seed, options=options)
-        env, worlds = self._bouts.env, np.arange(self.num_envs)
-        first = worlds * env.rules.bout_steps // self.num_envs if self._staggered else 0 * worlds
-        env.reset(worlds, self.np_random, first.astype(np.int32))
-        return self._bouts.observe(), {}
+        return self._bouts.start(self.np_random, staggered=self._staggered), {}
 
     def step(
         self, actions: Float32s
     ) -> tuple[Float32s, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Carry out one control step of 10 ms in every bout."""
-        env = self._bouts.env
-        paid, _ = self._bouts.step(np.asarray(actions, np.float32), self.np_random)
-        truncated = env.scores.finished()
+        turn = self._bouts.advance(np.asarray(actions, np.float32), self.np_random)
         info: dict[str, Any] = {}
-        obs = self._bouts.observe()
-        if truncated.any():
+        if turn.ended.any():
             final = np.full(self.num_envs, None, object)
-            for world in np.flatnonzero(truncated):
-                final[world] = obs[world].copy()
-            score = np.where(truncated, env.scores.score, 0.0)
-            info["final_obs"], info["_final_obs"] = final, truncated
-            info["final_info"] = {"score": score, "_score": truncated}
-            info["_final_info"] = truncated
-            env.reset(np.flatnonzero(truncated), self.np_random)
-            obs = self._bouts.observe()
-        return obs, paid, np.zeros(self.num_envs, np.bool_), truncated, info
+            for world, seen in zip(np.flatnonzero(turn.ended), turn.last_seen, strict=True):
+                final[world] = seen
+            info["final_obs"], info["_final_obs"] = final, turn.ended
+            info["final_info"] = {"score": turn.scores, "_score": turn.ended}
+            info["_final_info"] = turn.ended
+        return turn.obs, turn.paid, np.zeros(self.num_envs, np.bool_), turn.ended, info

@@ -90,7 +90,7 @@ def observe(env: FencingEnv) -> tuple[Float32s, Float32s]:
     return antagonist, protagonist
 
 
-def _float32s(box: gymnasium.spaces.Box[Any]) -> "gymnasium.Space[Float32s]":
+def _float32s(box: "gymnasium.spaces.Box[Any]") -> "gymnasium.Space[Float32s]":
     return cast("gymnasium.Space[Float32s]", box)  # a box does not tell its dtype to the checker
 
 

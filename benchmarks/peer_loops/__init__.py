@@ -1,0 +1,1 @@
+"""Training loops of other projects on our environment, each in an environment of its own."""

@@ -1,0 +1,242 @@
+"""Training samples a second against other projects' loops: same environment, same PPO, two cores.
+
+Each peer lives in a virtual environment of its own (`benchmarks/peer_loops/requirements`), made on
+the first run, and trains the antagonist against a frozen fresh protagonist, as ours does. Of each
+the fastest mode is taken: all of them are tried for a shorter window first. Rounds are interleaved.
+"""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from benchmarks.harness import ROOT, interleaved, median
+from benchmarks.peer_loops.environments import CannotInstallError, interpreter, size_mib
+from benchmarks.peer_loops.work import Timing, Work
+from benchmarks.train import ours
+from services.jobs.bench import Check, Measurement
+from services.jobs.settings import Settings
+
+QUESTION = "training samples/s of a real run against other projects' loops, on two cores"
+IN_PROCESS_GOAL, DISTRIBUTED_GOAL = 1.5, 5.0
+DEADLINE = 300.0
+"""Longest that one run of a peer may take to start, warm up and end, beside its window (s)."""
+
+
+class Peer(msgspec.Struct, frozen=True, kw_only=True):
+    """One way in which a project can run."""
+
+    name: str
+    module: str
+    """Of `benchmarks.peer_loops`."""
+    requirements: str = ""
+    """Which environment; empty: ours."""
+    mode: str = ""
+    num_envs: int = 128
+    threads: int = 1
+    is_distributed: bool = False
+    """Whether it is held to the goal of those that spread over processes."""
+
+
+def _in_process(name: str, module: str, requirements: str) -> tuple[Peer, ...]:
+    return tuple(
+        Peer(name=name, module=module, requirements=requirements, num_envs=num_envs,
+             threads=threads)
+        for num_envs, threads in ((128, 1), (256, 1), (512, 1), (256, 2))
+    )  # fmt: skip
+
+
+PEERS = (
+    *_in_process("rsl_rl's runner", "rsl_rl_runner", ""),
+    *_in_process("CleanRL's style", "cleanrl_style", ""),
+    *_in_process("Stable-Baselines3", "stable_baselines3", "stable-baselines3"),
+    *(
+        Peer(name="Sample Factory", module="sample_factory", requirements="sample-factory",
+             mode=mode, num_envs=num_envs, is_distributed=True)
+        for mode in ("serial", "sync", "async")
+        for num_envs in (128, 256)
+    ),
+    *(
+        Peer(name="RLlib", module="rllib", requirements="rllib", mode=mode, num_envs=num_envs,
+             is_distributed=True)
+        for mode in ("ppo", "appo")
+        for num_envs in (64, 128)
+    ),
+)  # fmt: skip
+
+
+class PeerFailedError(Exception):
+    """A peer did not come to the end of its window; says how it ended."""
+
+
+def work_of(peer: Peer, settings: Settings, opponent: Path, seconds: float) -> Work:
+    """Return what a peer is given: our settings, in plain numbers."""
+    cfg = settings.learner
+    return Work(
+        opponent=str(opponent), num_envs=peer.num_envs, batch_samples=cfg.batch_samples,
+        hidden_dims=cfg.hidden_dims, epochs=cfg.epochs, minibatches=cfg.minibatches,
+        learning_rate=cfg.learning_rate, gamma=cfg.gamma, gae_lambda=cfg.gae_lambda,
+        clip=cfg.clip, entropy_coef=cfg.entropy_coef, value_loss_coef=cfg.value_loss_coef,
+        max_grad_norm=cfg.max_grad_norm, initial_std=cfg.initial_std, mode=peer.mode,
+        seconds=seconds, threads=peer.threads,
+    )  # fmt: skip
+
+
+def run(peer: Peer, work: Work) -> dict[str, Any]:
+    """Return what a peer did in its window.
+
+    Raises:
+        CannotInstallError: its environment cannot be made.
+        PeerFailedError: it did not come to its end.
+    """
+    python = interpreter(peer.requirements) if peer.requirements else Path(sys.executable)
+    command = [python, "-m", f"benchmarks.peer_loops.{peer.module}", msgspec.json.encode(work)]
+    with tempfile.TemporaryDirectory(prefix="riposte-peer-") as folder:
+        started = subprocess.Popen(
+            command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            env=os.environ | {"PYTHONPATH": str(ROOT), "RAY_TMPDIR": folder},
+            start_new_session=True,
+        )  # fmt: skip
+        try:
+            said, _ = started.communicate(timeout=DEADLINE + work.seconds)
+        except subprocess.TimeoutExpired:
+            raise PeerFailedError(f"{peer.name} had not ended after {DEADLINE:g} s more") from None
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(started.pid, signal.SIGKILL)
+            started.wait()
+    lines = said.strip().splitlines()
+    if started.returncode or not lines:
+        raise PeerFailedError(f"{peer.name} ended with {started.returncode}: {lines[-1:]}")
+    timing = msgspec.json.decode(lines[-1], type=Timing)
+    return msgspec.to_builtins(timing) | {
+        "peer": peer.name,
+        "mode": peer.mode,
+        "num_envs": peer.num_envs,
+        "threads": peer.threads,
+        "samples_per_s": timing.samples / timing.wall_s,
+        "samples_per_cpu_s": timing.samples / timing.cpu_s,
+    }
+
+
+def fastest(settings: Settings, opponent: Path, seconds: float, *, smoke: bool) -> Iterator[
+    tuple[Peer, list[dict[str, Any]]]
+]:  # fmt: skip
+    """Try every mode of every peer; yield each project's fastest with all that was tried."""
+    for name in dict.fromkeys(peer.name for peer in PEERS):
+        modes = [peer for peer in PEERS if peer.name == name][: 1 if smoke else None]
+        tried: list[tuple[float, Peer, dict[str, Any]]] = []
+        for peer in modes:
+            try:
+                figures = run(peer, work_of(peer, settings, opponent, seconds))
+            except (CannotInstallError, PeerFailedError) as error:
+                print(f"left out: {peer.mode} with {peer.num_envs}: {error}", file=sys.stderr)
+                continue
+            print(_line(figures), file=sys.stderr, flush=True)
+            tried.append((figures["samples_per_s"], peer, figures))
+        if tried:
+            yield max(tried, key=lambda one: one[0])[1], [one[2] for one in tried]
+
+
+def _line(figures: dict[str, Any]) -> str:
+    how = f"{figures['mode'] or 'in process'}, {figures['num_envs']} bouts"
+    return (
+        f"{figures['peer']:<18} {how:<22} {figures['threads']} threads "
+        f"{figures['samples_per_s']:9,.0f} samples/s {figures['samples_per_cpu_s']:9,.0f} a CPU s"
+    )
+
+
+def measure(smoke: bool) -> Measurement:
+    """Return our training speed beside every peer's fastest mode."""
+    cores = sorted(os.sched_getaffinity(0))
+    os.sched_setaffinity(0, cores[:2])
+    seconds, rounds = (1.0, 1) if smoke else (25.0, 3)
+    settings = Settings.load(None)
+    try:
+        with tempfile.TemporaryDirectory(prefix="riposte-peers-") as folder:
+            opponent = fresh_protagonist(settings, Path(folder) / "opponent.safetensors")
+            found = list(fastest(settings, opponent, min(seconds, 10.0), smoke=smoke))
+
+            def side(peer: Peer) -> Callable[[], dict[str, Any]]:
+                return lambda: run(peer, work_of(peer, settings, opponent, seconds))
+
+            sides = [lambda: ours(seconds), *(side(peer) for peer, _ in found)]
+            turns = interleaved(rounds, sides)
+    finally:
+        os.sched_setaffinity(0, cores)
+    return _measurement([peer for peer, _ in found], turns, [tried for _, tried in found])
+
+
+def _measurement(
+    peers: list[Peer], turns: list[tuple[dict[str, Any], ...]], tried: list[list[dict[str, Any]]]
+) -> Measurement:
+    runs = tuple(
+        {"ours": our["samples_per_s"], "ours_per_cpu_s": our["samples_per_cpu_s"]}
+        | {peer.name: their["samples_per_s"] for peer, their in zip(peers, theirs, strict=True)}
+        | {
+            f"{peer.name}, per CPU second": their["samples_per_cpu_s"]
+            for peer, their in zip(peers, theirs, strict=True)
+        }
+        | {
+            f"ratio to {peer.name}": our["samples_per_s"] / their["samples_per_s"]
+            for peer, their in zip(peers, theirs, strict=True)
+        }
+        for our, *theirs in turns
+    )
+    best = max(
+        (peer for peer in peers if not peer.is_distributed),
+        key=lambda peer: median(runs, peer.name),
+    )
+    ratios = [
+        Check(
+            name=f"ours / {peer.name}", value=median(runs, f"ratio to {peer.name}"),
+            goal=DISTRIBUTED_GOAL if peer.is_distributed else IN_PROCESS_GOAL,
+        )
+        for peer in peers if peer is not best
+    ]  # fmt: skip
+    figures = [
+        Check(name=f"{what} {peer.name}", value=value, unit=unit)
+        for peer, their in zip(peers, turns[-1][1:], strict=True)
+        for what, value, unit in (
+            ("samples/s of", median(runs, peer.name), ""),
+            ("per CPU second of", median(runs, f"{peer.name}, per CPU second"), ""),
+            ("first update of", their["first_update_s"], "s"),
+            ("memory of", their["resident_mib"], "MiB"),
+        )
+    ]
+    sizes = {
+        name: size_mib(interpreter(name))
+        for name in dict.fromkeys(peer.requirements for peer in peers if peer.requirements)
+    }
+    return Measurement(
+        value=median(runs, "ours"),
+        unit="samples/s",
+        limit=median(runs, best.name),
+        ratio=Check(
+            name=f"ours / {best.name}, the best in one process",
+            value=median(runs, f"ratio to {best.name}"), goal=IN_PROCESS_GOAL,
+        ),
+        runs=runs,
+        checks=(*ratios, Check(name="ours per CPU second", value=median(runs, "ours_per_cpu_s")),
+                *figures),
+        details={"tried": tried, "turns": turns, "environments_mib": sizes},
+    )  # fmt: skip
+
+
+def fresh_protagonist(settings: Settings, path: Path) -> Path:
+    """Write the snapshot of an untrained protagonist, from a process of its own: it needs torch.
+
+    Args:
+        settings: whose networks.
+        path: of the file.
+    """
+    command = [sys.executable, "-m", "benchmarks.peer_loops.opponent", str(path)]
+    subprocess.run(command, cwd=ROOT, check=True, timeout=120)
+    return path
