@@ -192,8 +192,8 @@ class ParticipantView(msgspec.Struct, frozen=True, kw_only=True):
 
     screen: Screen
     session: str = ""
-    """Says nothing, and is another one for every session: what was typed in one is not shown in
-    the next."""
+    """Says nothing; another one for every session, and the same after a restart of the runner:
+    what was typed in one session is not shown in the next."""
     step: str = ""
     """Its id; asks name it, so that none counts for another step."""
     title: str = ""

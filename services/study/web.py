@@ -179,7 +179,6 @@ class Web:
 
     async def _serve(self, role: Role, connection: ServerConnection) -> None:
         """Serve one page until it goes, or another takes over."""
-        page = _Page(role, Talk(connection))
         pages = self._pages[role]
         if role == "participant":
             for before in pages:
@@ -187,7 +186,9 @@ class Web:
                     self._tally.add("pages_replaced")
         elif len(pages) >= MAX_PAGES:
             self._tally.refuse("pages_refused", f"{MAX_PAGES} researcher's pages are open")
-            page.talk.end(TOO_MANY, f"{MAX_PAGES} pages are open: close one of them")
+            await connection.close(TOO_MANY, f"{MAX_PAGES} pages are open: close one of them")
+            return
+        page = _Page(role, Talk(connection))
         pages.append(page)
         number = self._tally.add("pages")
         log.info("page_opened", page=number, role=role)

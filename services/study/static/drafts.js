@@ -4,18 +4,13 @@ const STORE = "riposte-study-drafts";
 
 export class Drafts {
   constructor() {
-    const kept = JSON.parse(sessionStorage.getItem(STORE) ?? "null");
-    this.session = kept?.session ?? null;
-    this.steps = kept?.steps ?? {};
+    this.steps = JSON.parse(sessionStorage.getItem(STORE) ?? "{}");
   }
 
-  /** Be in a session; what was typed in another one is forgotten. */
-  enter(session) {
-    if (session === this.session) return false;
-    this.session = session;
+  /** Forget everything: another person sits here now. */
+  forget() {
     this.steps = {};
     this.keep();
-    return true;
   }
 
   /** Return what was kept of a step: answers by item, "page", or "ticks". */
@@ -29,6 +24,6 @@ export class Drafts {
   }
 
   keep() {
-    sessionStorage.setItem(STORE, JSON.stringify({ session: this.session, steps: this.steps }));
+    sessionStorage.setItem(STORE, JSON.stringify(this.steps));
   }
 }

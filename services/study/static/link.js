@@ -28,8 +28,11 @@ export class Link {
     this.socket = null;
     this.state = "";
     this.viewAt = 0;
+    this.againAt = Infinity;
     this.store = `riposte-study-${role}-asks`;
-    this.lasting = new Map(Object.entries(JSON.parse(sessionStorage.getItem(this.store) ?? "{}")));
+    const kept = JSON.parse(sessionStorage.getItem(this.store) ?? "null");
+    this.session = kept?.session ?? null;
+    this.lasting = new Map(Object.entries(kept?.asks ?? {}));
     this.passing = new Map();
     setInterval(() => this.watch(), 250);
     this.connect();
@@ -41,7 +44,7 @@ export class Link {
     socket.onopen = () => {
       this.viewAt = performance.now();
       this.say("open");
-      for (const ask of this.lasting.values()) this.send(ask);
+      this.againAt = Infinity; // not before the first view has said which session this is
     };
     socket.onmessage = (event) => this.receive(JSON.parse(event.data));
     socket.onclose = (event) => {
@@ -69,6 +72,7 @@ export class Link {
       this.viewAt = performance.now();
       this.say("open");
       this.on.view(said.view);
+      if (this.againAt === Infinity) this.againAt = 0;
       return;
     }
     const { reply } = said;
@@ -84,8 +88,8 @@ export class Link {
     const now = performance.now();
     if (this.isOpen && now - this.viewAt > SILENT_MS) this.say("silent");
     for (const [id, { at }] of this.passing) if (now - at > PATIENCE_MS) this.giveUp(id);
-    if (now - (this.againAt ?? 0) < AGAIN_MS) return;
-    this.againAt = now;
+    if (now < this.againAt) return;
+    this.againAt = now + AGAIN_MS;
     for (const ask of this.lasting.values()) this.send(ask);
   }
 
@@ -104,9 +108,11 @@ export class Link {
     return ask;
   }
 
-  /** Ask for something now or not at all; return whether it was said. */
+  /** Ask for something now or not at all; return whether it was said. A second click says nothing more. */
   askNow(wish) {
     if (!this.isOpen || this.state === "silent") return false;
+    const said = [...this.passing.values()].map(({ ask }) => ask);
+    if (said.some((ask) => ask.action === wish.action && ask.step === wish.step && ask.attempt === wish.attempt)) return true;
     const ask = { id: newId(), ...wish };
     this.passing.set(ask.id, { ask, at: performance.now() });
     this.send(ask);
@@ -118,10 +124,13 @@ export class Link {
     return [...this.lasting.values()].find(fits);
   }
 
-  /** Forget asks that nobody has to hear any more. */
-  forget(fits) {
-    for (const ask of [...this.lasting.values()].filter(fits)) this.lasting.delete(ask.id);
+  /** Be in a session; asks of another one are nobody's any more. Return whether it is a new one. */
+  enter(session) {
+    if (session === this.session) return false;
+    this.session = session;
+    this.lasting.clear();
     this.keep();
+    return true;
   }
 
   send(ask) {
@@ -129,6 +138,6 @@ export class Link {
   }
 
   keep() {
-    sessionStorage.setItem(this.store, JSON.stringify(Object.fromEntries(this.lasting)));
+    sessionStorage.setItem(this.store, JSON.stringify({ session: this.session, asks: Object.fromEntries(this.lasting) }));
   }
 }

@@ -16,7 +16,7 @@ const page = { view: null, words: wordsOf("en"), update: null, form: null, conse
 
 const link = new Link("participant", {
   view: (view) => {
-    if (drafts.enter(view.session)) link.forget(() => true);
+    if (link.enter(view.session)) drafts.forget();
     page.view = view;
     show();
   },

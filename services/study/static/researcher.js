@@ -23,6 +23,7 @@ const page = { view: null };
 const dialog = new Dialog();
 const link = new Link("researcher", {
   view: (view) => {
+    link.enter(`${view.study}/${view.participant}`);
     page.view = view;
     show(view);
   },
