@@ -21,6 +21,7 @@ JOBS = (
     Command("play", "jobs.play.command", "fence against the robot, or watch two policies do it"),
     Command("robot", "jobs.robot.command", "check, arm, disarm or reset the robot"),
     Command("train", "jobs.train.command", "train two fencers on this machine, with a report"),
+    Command("study", "jobs.study.command", "run a study with people, and what follows from it"),
     Command("tournament", "jobs.tournament.command", "everybody of a run against everybody"),
     Command("ratings", "jobs.tournament.ratings", "rate the players of a run's tournament"),
     Command("status", "jobs.status", "who runs, and who waits for whom"),

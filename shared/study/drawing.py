@@ -44,12 +44,13 @@ def draw_orders(folder: Path, people: int, seed: int, clock: Clock) -> Study:
     rows = [
         AllocationRow(participant=name, order=",".join(order)) for name, order in made.assignments
     ]
-    if there:
+    if there or (folder / KEY).exists():
         rows = _extended(folder, there, rows, made, seed)
-    key = _key(protocol, hash_of(data), made, seed)
+    people = max([people, *(_number(row.participant) for row in rows)])
+    key = _key(protocol, hash_of(data), made, seed, people)
     note_change(folder, f"orders drawn: {len(rows)} participants are expected", clock)
-    atomic_write(folder / KEY, (_KEY_HEADING + tomli_w.dumps(key)).encode(), mode=0o600)
     write_table(folder / ALLOCATION, rows, AllocationRow)
+    atomic_write(folder / KEY, (_KEY_HEADING + tomli_w.dumps(key)).encode(), mode=0o600)
     return open_study(folder)
 
 
@@ -57,7 +58,7 @@ def _extended(
     folder: Path, there: list[AllocationRow], rows: list[AllocationRow], made: Allocation,
     seed: int,
 ) -> list[AllocationRow]:  # fmt: skip
-    """Return the rows that are there and those that come after them.
+    """Return the rows that are there and those that come after all that were ever drawn.
 
     Raises:
         StudyError: what is there was not drawn from this protocol and seed.
@@ -65,14 +66,14 @@ def _extended(
     key = read_key(folder)
     meant = {label: entry.condition for label, entry in key.label.items()} if key else {}
     by_name = {row.participant: row for row in rows}
-    is_same = key is not None and key.seed == seed and meant == made.labels
-    if not is_same or any(by_name.get(row.participant, row) != row for row in there):
+    is_other = any(by_name.get(row.participant, row) != row for row in there)
+    if key is None or key.seed != seed or meant != made.labels or is_other:
         raise StudyError(
             f"{folder / ALLOCATION} holds other orders: draw more people with the seed it was "
             f"drawn with (in {KEY}); to begin anew, as long as nobody has played, delete "
             f"{ALLOCATION} and {KEY}"
         )
-    last = max(_number(row.participant) for row in there)
+    last = max([key.people, *(_number(row.participant) for row in there)])
     return [*there, *(row for row in rows if _number(row.participant) > last)]
 
 
@@ -80,11 +81,14 @@ def _number(participant: str) -> int:
     return int(participant.removeprefix("sub-"))
 
 
-def _key(protocol: Protocol, digest: str, made: Allocation, seed: int) -> Mapping[str, object]:
+def _key(
+    protocol: Protocol, digest: str, made: Allocation, seed: int, people: int
+) -> Mapping[str, object]:
     return {
         "schema": 1,
         "study": protocol.name,
         "seed": seed,
+        "people": people,
         "protocol": digest,
         "label": {
             label: {"condition": name, "player": protocol.condition_named(name).player}

@@ -63,6 +63,8 @@ class Key(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     schema: Literal[1] = 1
     study: Name
     seed: int
+    people: int
+    """How many orders were drawn: whoever withdraws leaves a number that nobody else is given."""
     protocol: Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]
     """SHA-256 of protocol.toml when the orders were drawn."""
     label: dict[Label, KeyEntry]

@@ -150,10 +150,15 @@ def unblind_columns(table: str, found: Columns, names: Mapping[str, str]) -> Non
     """
     for column in ("condition", "order"):
         if column in found:
-            found[column] = [_named(table, text, names) for text in found[column]]
+            found[column] = [named(table, text, names) for text in found[column]]
 
 
-def _named(table: str, text: str, names: Mapping[str, str]) -> str:
+def named(table: str, text: str, names: Mapping[str, str]) -> str:
+    """Return the names of the conditions for labels with commas between them; none for none.
+
+    Raises:
+        StudyError: a label stands for no condition.
+    """
     unknown = [label for label in text.split(",") if label and label not in names]
     if unknown:
         raise StudyError(f"{table}: label {unknown[0]!r} stands for no condition (key.toml)")

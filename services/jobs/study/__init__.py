@@ -1,0 +1,1 @@
+"""`riposte study`: studies with people, from the protocol to the tables of the paper."""
