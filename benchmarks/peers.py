@@ -1,6 +1,6 @@
 """Training samples a second against other projects' loops: same environment, same PPO, two cores.
 
-Each peer lives in a virtual environment of its own (`benchmarks/peer_loops/requirements`), made on
+Each peer lives in a virtual environment of its own (`benchmarks/requirements`), made on
 the first run, and trains the antagonist against a frozen fresh protagonist, as ours does. Of each
 the fastest mode is taken: all of them are tried for a shorter window first. Rounds are interleaved.
 """
@@ -17,8 +17,8 @@ from typing import Any
 
 import msgspec
 
+from benchmarks.environments import CannotInstallError, interpreter, size_mib
 from benchmarks.harness import ROOT, interleaved, median
-from benchmarks.peer_loops.environments import CannotInstallError, interpreter, size_mib
 from benchmarks.peer_loops.work import Timing, Work
 from benchmarks.train import ours
 from services.jobs.bench import Check, Measurement

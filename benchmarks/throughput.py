@@ -7,6 +7,7 @@ Part of ``riposte bench bus``.
 
 import argparse
 import contextlib
+import dataclasses
 import socket
 import statistics
 import subprocess
@@ -186,15 +187,21 @@ def start(*args: str, module: str = "") -> Iterator[subprocess.Popen[str]]:
             process.stdout.close()
 
 
-def figures(smoke: bool) -> dict[str, Any]:
-    """Return codec, round trip and rate of acknowledged rollouts, medians of the rounds."""
-    rounds = 10 if smoke else 200
+@dataclasses.dataclass(frozen=True)
+class Link:
+    """An actor's end of a bus that has a router and a learner that answers."""
+
+    bus: ZenohBus
+    processes: list[psutil.Process]
+    """This one, the router and the learner."""
+
+
+@contextlib.contextmanager
+def linked() -> Iterator[Link]:
+    """Start router and learner, and stop them when the block ends."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-    runs: list[dict[str, float]] = []
-    codec_figures = codec(5 * rounds)
-    size = int(codec_figures["payload_bytes"])
     with (
         tempfile.TemporaryDirectory() as folder,
         start("--run", folder, "--listen", endpoint, module="services.router") as router,
@@ -208,12 +215,22 @@ def figures(smoke: bool) -> dict[str, Any]:
             if time.monotonic() > deadline:
                 raise SystemExit("the learner did not come up within 20 s")
             bus.wait(0.1)
-        processes = [psutil.Process(), psutil.Process(router.pid), psutil.Process(learner.pid)]
-        rollouts(bus, 10, processes)
+        others = [psutil.Process(router.pid), psutil.Process(learner.pid)]
+        yield Link(bus, [psutil.Process(), *others])
+
+
+def figures(smoke: bool) -> dict[str, Any]:
+    """Return codec, round trip and rate of acknowledged rollouts, medians of the rounds."""
+    rounds = 10 if smoke else 200
+    runs: list[dict[str, float]] = []
+    codec_figures = codec(5 * rounds)
+    size = int(codec_figures["payload_bytes"])
+    with linked() as link:
+        rollouts(link.bus, 10, link.processes)
         for _ in range(1 if smoke else 5):
             limit = bare_tcp(rounds, size)
-            runs.append({**rollouts(bus, rounds, processes), "bare_tcp_mb_per_s": limit})
-        trips = round_trips(bus, 5 * rounds)
+            runs.append({**rollouts(link.bus, rounds, link.processes), "bare_tcp_mb_per_s": limit})
+        trips = round_trips(link.bus, 5 * rounds)
 
     def middle(name: str) -> float:
         return statistics.median(run[name] for run in runs)

@@ -1,0 +1,1 @@
+"""Other ways to carry acknowledged messages between two processes of one machine."""
