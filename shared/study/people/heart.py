@@ -15,6 +15,8 @@ WALKING: Final = 0.18
 """Share of the reserve that a slow walk takes."""
 STANDING: Final = 0.06
 """The same of standing ready with a bat."""
+FULL_SPEED: Final = 0.5
+"""Mean speed of the hand that takes all that a game takes of a person (m/s; invented)."""
 
 
 class Heart:
@@ -41,10 +43,10 @@ class Heart:
 
 
 def effort_of(hand_speed: float, exertion: float) -> float:
-    """Return the effort of a game (share of the reserve): all of ``exertion`` at 1 m/s.
+    """Return the effort of a game (share of the reserve).
 
     Args:
         hand_speed: lately, mean (m/s).
         exertion: of the person at full effort.
     """
-    return STANDING + (exertion - STANDING) * min(hand_speed, 1.0)
+    return STANDING + (exertion - STANDING) * min(hand_speed / FULL_SPEED, 1.0)

@@ -137,7 +137,7 @@ def draw(population: Population, number: int, seed: int) -> Traits:
         resting=float(population.resting[0] + population.resting[1] * np.clip(normal[4], -2, 2)),
         enthusiasm=float(normal[5]),
         acquiescence=float(normal[6]),
-        exertion=float(np.clip(0.65 + 0.12 * normal[7], 0.3, 1.0)),
+        exertion=float(np.clip(0.75 + 0.12 * normal[7], 0.3, 1.0)),
     )
 
 
