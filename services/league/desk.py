@@ -107,7 +107,7 @@ class Desk:
 
         Raises:
             SnapshotError: it can never be entered; says why.
-            RiposteError: it cannot be stored now.
+            RiposteError: it cannot be stored, or the ledger cannot be read, now.
         """
         known = self._state.versions[report.agent].get(report.policy_version)
         if known is not None:
@@ -220,7 +220,7 @@ class Desk:
                 name
                 for version in self._state.versions[report.agent].values()
                 if version.version >= report.policy_version and version.snapshot != report.snapshot
-                for name in version.rollouts
+                for name in self._journal.rollouts_behind(version.agent, version.version)
             ),
             reason=reason,
         )

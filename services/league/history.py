@@ -10,7 +10,8 @@ from collections.abc import Iterable
 from services.league import events
 from services.league.config import LeagueConfig
 from services.league.events import Entry, LeaseEnd
-from services.league.records import CurvePoint, StageRecord, VersionRecord
+from services.league.names import Names
+from services.league.records import CurvePoint, StageRecord, VersionRecord, packed
 from shared.messages.training import AGENTS, Agent
 
 SCRIPTED_STATIC = "scripted:static"
@@ -99,11 +100,11 @@ class RunState:
     """Ids of those that have not ended, oldest first."""
     ended_leases: list[str] = dataclasses.field(default_factory=list[str])
     """Ids in the order they ended."""
-    result_names: set[str] = dataclasses.field(default_factory=set[str])
+    result_names: Names = dataclasses.field(default_factory=Names)
     """Names of all results messages in the ledger."""
     incident_keys: set[str] = dataclasses.field(default_factory=set[str])
-    rollout_versions: dict[str, str] = dataclasses.field(default_factory=dict[str, str])
-    """Which version (``agent:number``) each rollout name went into first."""
+    rollout_names: Names = dataclasses.field(default_factory=Names)
+    """Names of all rollouts behind the versions in the ledger."""
     repeated_rollouts: int = 0
     """Rollout names that a second version claimed too: 0 in a sound run."""
     model: str = ""
@@ -270,12 +271,11 @@ class RunState:
 
     def _version(self, event: events.VersionEntered, at_ns: int) -> None:
         record = VersionRecord(
-            agent=event.agent,
+            agent=AGENTS[AGENTS.index(event.agent)],  # not a copy of the word for each version
             version=event.version,
             stage=event.stage,
             snapshot=event.snapshot,
-            rollouts=event.rollouts,
-            metrics=event.metrics,
+            numbers=packed(event.metrics),
             at_ns=at_ns,
         )
         if event.stage >= 0:
@@ -284,9 +284,8 @@ class RunState:
         self.versions[event.agent][event.version] = record
         if event.metrics is not None:
             self.total_samples[event.agent] = event.metrics.total_samples
-        for name in event.rollouts:
-            if self.rollout_versions.setdefault(name, event.key) != event.key:
-                self.repeated_rollouts += 1
+        for name in set(event.rollouts):
+            self.repeated_rollouts += not self.rollout_names.add(name)
 
     def _lease_granted(self, event: events.LeaseGranted, at_ns: int) -> None:
         self.leases[event.lease] = LeaseRecord(grant=event, granted_at_ns=at_ns)
@@ -314,11 +313,7 @@ class RunState:
             if not record.points or record.points[-1].update != record.updates:
                 samples = sum(self.total_samples.values())
                 record.points.append(CurvePoint(record.updates, samples, at_ns))
-            point = record.points[-1]
-            point.score.append(event.score[i])
-            point.attack_steps.append(event.attack_steps[i])
-            point.penalty_steps.append(event.penalty_steps[i])
-            point.camping_steps.append(event.camping_steps[i])
+            record.points[-1].score.append(event.score[i])
 
     def _evaluated(self, event: events.BoutsPlayed) -> None:
         grant = self.leases[event.lease].grant

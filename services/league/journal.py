@@ -4,11 +4,12 @@ from pathlib import Path
 
 import structlog
 
-from services.league.events import Entry, Event, RunStarted
+from services.league.events import Entry, Event, RunStarted, VersionEntered
 from services.league.history import RunState
 from services.league.ledger import Ledger
 from shared.clock import Clock
 from shared.errors import LedgerError
+from shared.messages.training import Agent
 
 RETRY_SECONDS = 0.5
 """After the ledger failed, it is left alone this long before it is tried again."""
@@ -108,6 +109,17 @@ class Journal:
         """
         self._ledger.rewind(position)
         self.state = self._replay()
+
+    def rollouts_behind(self, agent: Agent, version: int) -> tuple[str, ...]:
+        """Return the names of the rollouts that a version of the state was made from.
+
+        Raises:
+            LedgerError: the ledger cannot be read now.
+        """
+        key = f"{agent}:{version}"
+        new = [e for e in self.uncommitted if isinstance(e, VersionEntered) and e.key == key]
+        event = new[0] if new else self._ledger.find(VersionEntered, key)
+        return event.rollouts if event is not None else ()
 
     def close(self) -> None:
         """Close the ledger."""

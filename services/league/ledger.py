@@ -6,6 +6,7 @@ import os
 import sqlite3
 from collections.abc import Generator, Iterator, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from services.league.events import Entry, Event, decode_event, encode_event
 from shared.errors import LedgerError
@@ -25,6 +26,7 @@ CREATE TABLE events (
     UNIQUE (kind, key)
 )
 """
+E = TypeVar("E", bound=Event)
 _OUT_OF_SPACE = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)
 _DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 
@@ -114,6 +116,21 @@ class Ledger:
             LedgerError: the file is damaged, or a newer Riposte wrote it.
         """
         return _read(self._connection, self.path)
+
+    def find(self, kind: type[E], key: str) -> E | None:
+        """Return the event of a kind under a key, None when there is none.
+
+        Raises:
+            LedgerError: the file is damaged.
+        """
+        query = "SELECT body FROM events WHERE kind = ? AND key = ?"
+        with _explained(self.path):
+            row = self._connection.execute(query, (kind.kind, key)).fetchone()
+        if row is None:
+            return None
+        event = _decoded(self.path, f"{kind.kind} {key}", kind.kind, row[0])
+        assert isinstance(event, kind)
+        return event
 
     def rewind(self, seq: int) -> None:
         """Forget every event after ``seq``; only for resuming a serial run from a cut.
@@ -264,13 +281,14 @@ def _read(connection: sqlite3.Connection, path: Path, after: int = 0) -> Iterato
     with _explained(path):
         rows = connection.execute(query, (after,))
         for seq, kind, body, at_ns in rows:
-            try:
-                event = decode_event(kind, body)
-            except ValueError as error:
-                raise LedgerError(
-                    f"ledger {path} is damaged at event {seq}: {error}; {_RESTORE}"
-                ) from error
-            yield Entry(seq=seq, at_ns=at_ns, event=event)
+            yield Entry(seq=seq, at_ns=at_ns, event=_decoded(path, f"event {seq}", kind, body))
+
+
+def _decoded(path: Path, where: str, kind: str, body: str) -> Event:
+    try:
+        return decode_event(kind, body)
+    except ValueError as error:
+        raise LedgerError(f"ledger {path} is damaged at {where}: {error}; {_RESTORE}") from error
 
 
 _RESTORE = "restore it from a copy, or start a new run in another folder"

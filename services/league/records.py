@@ -1,14 +1,26 @@
 """What a run's state holds of each version and each stage; plain data, filled by the fold."""
 
 import dataclasses
+import struct
+from array import array
+from collections.abc import MutableSequence
+from typing import Any
+
+import msgspec
 
 from shared.messages.league import Stage
 from shared.messages.training import Agent, UpdateMetrics
 
+_NUMBERS = struct.Struct(
+    "="
+    + "".join("q" if field.type is int else "d" for field in msgspec.structs.fields(UpdateMetrics))
+)
+"""An update's numbers; a run has one for each version, and they are half of what it remembers."""
 
-@dataclasses.dataclass(frozen=True)
+
+@dataclasses.dataclass(frozen=True, slots=True)
 class VersionRecord:
-    """One policy version in the ledger."""
+    """One policy version in the ledger; the rollouts behind it stay there."""
 
     agent: Agent
     version: int
@@ -16,9 +28,14 @@ class VersionRecord:
     """-1 for version 0."""
     snapshot: str
     """Content hash (64 hex digits)."""
-    rollouts: tuple[str, ...]
-    metrics: UpdateMetrics | None
+    numbers: bytes
+    """Of the update it was made by; empty where there are none."""
     at_ns: int
+
+    @property
+    def metrics(self) -> UpdateMetrics | None:
+        """Return the numbers of the update it was made by."""
+        return UpdateMetrics(**_named(self.numbers)) if self.numbers else None
 
     @property
     def ref(self) -> str:
@@ -26,7 +43,25 @@ class VersionRecord:
         return f"sha256:{self.snapshot}"
 
 
-@dataclasses.dataclass
+def packed(metrics: UpdateMetrics | None) -> bytes:
+    """Return the numbers of an update as a version's record keeps them.
+
+    Raises:
+        ValueError: a count is too large for 64 bits.
+    """
+    if metrics is None:
+        return b""
+    try:
+        return _NUMBERS.pack(*msgspec.structs.astuple(metrics))
+    except struct.error as error:
+        raise ValueError(f"a count of an update is out of range: {error}") from error
+
+
+def _named(numbers: bytes) -> dict[str, Any]:
+    return dict(zip(UpdateMetrics.__struct_fields__, _NUMBERS.unpack(numbers), strict=True))
+
+
+@dataclasses.dataclass(slots=True)
 class CurvePoint:
     """The complete training bouts that ended while a stage had made ``update`` updates."""
 
@@ -36,11 +71,8 @@ class CurvePoint:
     """Samples both agents together had learned from, over the whole run."""
     at_ns: int
     """When the first of these bouts entered the ledger."""
-    score: list[float] = dataclasses.field(default_factory=list[float])
+    score: MutableSequence[float] = dataclasses.field(default_factory=lambda: array("d"))
     """The antagonist's total of each bout."""
-    attack_steps: list[int] = dataclasses.field(default_factory=list[int])
-    penalty_steps: list[int] = dataclasses.field(default_factory=list[int])
-    camping_steps: list[int] = dataclasses.field(default_factory=list[int])
 
     @property
     def mean(self) -> float:

@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 
+from shared.bus.ranges import LARGEST
 from shared.messages.league import LeaseSummary, Stage
 from shared.messages.training import ACTION_DIM, Agent, Rollout
 
 _LOG_PROB_TOLERANCE = 1e-2
 _STD_RANGE = (1e-4, 100.0)
-_LARGEST = 1e6
+_FARTHEST = 1e6
 """Of any number to learn from: squares of larger ones would soon be infinite."""
 
 
@@ -58,6 +59,8 @@ def check_provenance(
         leases: by name, alive or ended a moment ago.
         model: hash of the simulator model of this run.
     """
+    if not 0 <= rollout.sequence <= LARGEST:
+        return _drop(f"sequence {rollout.sequence} is no count")
     if rollout.agent != agent:
         return _drop(f"it is for the {rollout.agent}, this learner is the {agent}'s")
     if rollout.model != model:
@@ -116,8 +119,8 @@ def check_contents(rollout: Rollout, bout_steps: int) -> Ruling:
     if rollout.stds.min() < low or rollout.stds.max() > high:
         return _drop(f"standard deviations are outside {low} .. {high}")
     for field in ("obs", "last_obs", "actions", "means", "rewards"):
-        if np.abs(getattr(rollout, field)).max() > _LARGEST:
-            return _drop(f"{field} has a value beyond +-{_LARGEST:g}")
+        if np.abs(getattr(rollout, field)).max() > _FARTHEST:
+            return _drop(f"{field} has a value beyond +-{_FARTHEST:g}")
     noise = (rollout.actions - rollout.means) / rollout.stds
     expected = -0.5 * np.einsum("tni,tni->tn", noise, noise) - (
         float(np.sum(np.log(rollout.stds))) + 0.5 * ACTION_DIM * math.log(2.0 * math.pi)

@@ -19,6 +19,7 @@ from services.learner.gate import (
 )
 from shared.bus.base import Inbox, Request
 from shared.bus.delivery import Applied
+from shared.bus.ranges import LARGEST
 from shared.clock import Clock
 from shared.game.rules import RuleBook
 from shared.messages.league import Leases, LeaseSummary, Schedule, Stage
@@ -162,7 +163,7 @@ class Intake:
         """Never learn from these: the ledger has versions made from them that are lost here."""
         for name in names:
             boot, _, sequence = name.rpartition(":")
-            if sequence.isdecimal():
+            if sequence.isdecimal() and int(sequence) <= LARGEST:
                 self.applied.add(boot, int(sequence))
         known = set(names)
         for request, rollout in self._gathered:

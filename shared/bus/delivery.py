@@ -5,12 +5,12 @@ receiver keeps an ``Applied`` beside what it makes durable, and answers a messag
 before without applying it again. Together: nothing acknowledged is lost, nothing counts twice.
 """
 
-import bisect
 from typing import Generic, TypeVar
 
 import msgspec
 
 from shared.bus.base import Bus, NoAnswer, Pending, Refused
+from shared.bus.ranges import Ranges
 from shared.clock import Clock
 from shared.errors import CheckpointError
 from shared.messages.message import Message
@@ -18,6 +18,11 @@ from shared.messages.topics import Service
 
 In = TypeVar("In", bound=Message)
 Out = TypeVar("Out", bound=Message)
+
+MAX_BOOTS = 16_384
+"""That a receiver remembers: three times the sessions that a router takes."""
+MAX_RANGES = 1024
+"""Of one boot."""
 
 
 class _Entry(Generic[In, Out]):
@@ -133,49 +138,41 @@ class Applied:
     Sequence numbers are kept as ranges per boot. A sender has only a few messages unanswered at
     a time, so far below its newest one nothing is outstanding: when a boot has more than
     ``max_ranges`` ranges, the oldest gap counts as applied, and when there are more than
-    ``max_boots`` boots, the one that was quiet longest is forgotten.
+    ``max_boots`` boots, the one that was quiet longest is forgotten. What a forgotten boot repeats
+    would count twice; so there is room for more boots than a run has actors, at 30 bytes each in
+    the record.
     """
 
-    def __init__(self, max_boots: int = 1024, max_ranges: int = 1024) -> None:
+    def __init__(self, max_boots: int = MAX_BOOTS, max_ranges: int = MAX_RANGES) -> None:
         self._max_boots = max_boots
         self._max_ranges = max_ranges
-        self._boots: dict[str, list[list[int]]] = {}
+        self._boots: dict[str, Ranges] = {}
 
     def contains(self, boot: str, sequence: int) -> bool:
         """Return whether this message has been applied."""
         ranges = self._boots.get(boot)
-        if not ranges:
-            return False
-        at = bisect.bisect_right(ranges, sequence, key=_start) - 1
-        return at >= 0 and sequence <= ranges[at][1]
+        return ranges is not None and sequence in ranges
 
     def add(self, boot: str, sequence: int) -> None:
         """Enter a message; entering it again changes nothing."""
-        ranges = self._boots.pop(boot, None) or []
+        ranges = self._boots.pop(boot, None) or Ranges()
         self._boots[boot] = ranges  # now the youngest
-        at = bisect.bisect_right(ranges, sequence, key=_start)
-        if not (at and sequence <= ranges[at - 1][1]):
-            joins_left = at > 0 and ranges[at - 1][1] == sequence - 1
-            joins_right = at < len(ranges) and ranges[at][0] == sequence + 1
-            if joins_left and joins_right:
-                ranges[at - 1][1] = ranges.pop(at)[1]
-            elif joins_left:
-                ranges[at - 1][1] = sequence
-            elif joins_right:
-                ranges[at][0] = sequence
-            else:
-                ranges.insert(at, [sequence, sequence])
+        ranges.add(sequence)
         if len(ranges) > self._max_ranges:
-            ranges[0][1] = ranges.pop(1)[1]
-        if len(self._boots) > self._max_boots:
+            ranges.close_first_gap()
+        while len(self._boots) > self._max_boots:
             del self._boots[next(iter(self._boots))]
 
     def to_json(self) -> str:
         """Return everything as one line of JSON."""
-        return msgspec.json.encode(self._boots).decode()
+        return msgspec.json.encode(
+            {boot: list(ranges) for boot, ranges in self._boots.items()}
+        ).decode()
 
     @classmethod
-    def from_json(cls, text: str, max_boots: int = 1024, max_ranges: int = 1024) -> "Applied":
+    def from_json(
+        cls, text: str, max_boots: int = MAX_BOOTS, max_ranges: int = MAX_RANGES
+    ) -> "Applied":
         """Return what ``to_json`` wrote.
 
         Raises:
@@ -184,18 +181,10 @@ class Applied:
         applied = cls(max_boots, max_ranges)
         try:
             boots = msgspec.json.decode(text, type=dict[str, list[tuple[int, int]]])
-            for boot, ranges in boots.items():
-                ends = [-1, *(last for _, last in ranges)]
-                if any(
-                    last < first or first < end + 1 + (end >= 0)
-                    for end, (first, last) in zip(ends, ranges, strict=False)
-                ):
-                    raise ValueError(f"ranges of {boot[:80]!r} are out of order")
-                applied._boots[boot] = [[first, last] for first, last in ranges]
-        except ValueError as error:
+            for boot, pairs in boots.items():
+                ranges = applied._boots[boot] = Ranges()
+                for first, last in pairs:
+                    ranges.append(first, last)
+        except (ValueError, OverflowError) as error:
             raise CheckpointError(f"record of applied messages is damaged: {error}") from error
         return applied
-
-
-def _start(item: list[int]) -> int:
-    return item[0]

@@ -158,7 +158,8 @@ def test_applied_is_bounded_and_forgets_only_the_oldest() -> None:
 
 @pytest.mark.parametrize(
     "text", ["", "[]", "1", '{"a":1}', '{"a":[[1]]}', '{"a":[[3,1]]}', '{"a":[[0,4],[5,6]]}',
-             '{"a":[["0",4]]}', '{"a":[[0,true]]}', "[" * 100_000]
+             '{"a":[["0",4]]}', '{"a":[[0,true]]}', '{"a":[[-1,4]]}',
+             '{"a":[[0,9223372036854775808]]}', "[" * 100_000]
 )  # fmt: skip
 def test_a_damaged_record_is_refused(text: str) -> None:
     with pytest.raises(CheckpointError, match="record of applied messages is damaged"):

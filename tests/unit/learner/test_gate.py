@@ -50,6 +50,7 @@ def test_a_rollout_from_a_lease_of_this_stage_is_learned_from():
         ({"actor": "actor-1"}, "wrong actor: actor-1 in the rollout, actor-0 in lease L000001"),
         ({"seed": 12}, "wrong seed: 12 in the rollout, 11 in lease L000001"),
         ({"stage": -1}, "stage -1 is over"),
+        ({"sequence": -1, "draw": 0}, "sequence -1 is no count"),
     ],
 )
 def test_a_rollout_from_elsewhere_is_dropped_with_the_reason(changes: Any, reason: str):
@@ -69,6 +70,12 @@ def test_what_the_schedule_may_yet_say_is_asked_again(changes: Any, reason: str)
     ruling = check_provenance(rollout(**changes), "antagonist", STAGE, LEASES, MODEL)
     assert ruling.decision is Decision.LATER
     assert reason in ruling.reason
+
+
+def test_a_sequence_that_no_record_can_hold_is_dropped():
+    theirs = msgspec.structs.replace(rollout(), sequence=2**63)
+    ruling = check_provenance(theirs, "antagonist", STAGE, LEASES, MODEL)
+    assert (ruling.decision, ruling.is_fault) == (Decision.DROP, True)
 
 
 def test_a_rollout_of_the_other_learners_stage_is_over():

@@ -7,6 +7,8 @@ import msgspec
 import pytest
 
 from services.league.config import LeagueConfig
+from services.league.events import VersionEntered
+from services.league.ledger import open_read_only
 from services.league.service import League
 from services.learner.checkpoint import CheckpointStore
 from services.learner.service import Learner, RunFacts
@@ -84,6 +86,17 @@ class Both:
             opponent=self.lease.stage.opponent, policy_version=self.learner.version,
         )  # fmt: skip
 
+    def rollouts_behind(self, version: int) -> tuple[str, ...]:
+        """Return the names that the ledger has for a version of the antagonist."""
+        with open_read_only(self.folder / "run" / "league.sqlite") as ledger:
+            (found,) = (
+                entry.event
+                for entry in ledger.replay()
+                if isinstance(entry.event, VersionEntered)
+                and entry.event.key == f"antagonist:{version}"
+            )
+        return found.rollouts
+
     def send(self, message: Rollout) -> Any:
         """Hand a rollout to the learner, which takes it at once."""
         pending = self.actor.ask(ROLLOUT, message, 1000.0, agent="antagonist")
@@ -113,7 +126,7 @@ def entered_but_not_acknowledged(both: Both) -> list[Rollout]:
         both.send(message)
     both.settle(learner=False)
     names = tuple(message.name for message in messages)
-    assert both.league.state.versions["antagonist"][2].rollouts == names
+    assert both.rollouts_behind(2) == names
     both.kill_learner()
     both.damage_newest_checkpoint()
     both.start_learner()
@@ -139,7 +152,7 @@ def test_what_the_ledger_has_learned_from_counts_once_though_its_checkpoint_is_l
     both.settle()
     assert [answer.take() for answer in pending] == [Receipt(accepted=True)] * 2
     names = tuple(message.name for message in fresh)
-    assert state.versions["antagonist"][3].rollouts == names
+    assert both.rollouts_behind(3) == names
     assert both.send(two).take() == Receipt(accepted=True)
     assert state.repeated_rollouts == 0
     both.league.close()
