@@ -99,8 +99,7 @@ class Answering:
                 may.append("begin")
             if self._why_not_next(step) == "":
                 may.append("next")
-        may += ["void", "repeat"]
-        return tuple(may)
+        return (*may, "void", "repeat")
 
     def may_participant(self) -> tuple[ParticipantAction, ...]:
         """Return what a participant may say now."""
@@ -302,7 +301,7 @@ class Answering:
         session = self._session
         instrument = session.plan.protocol.instrument_named(step.instrument)
         sections = sections_to_rank(session)
-        items = items_of(instrument, [f"Section {number}" for number in sections])
+        items = items_of(instrument, sections)
         if lacks := lacks_of(items, ask.answers):
             return lacks
         if ask.action == "ranking":

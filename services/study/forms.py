@@ -6,12 +6,12 @@ from services.study.view import Answer, Item
 from shared.study.protocol import Instrument
 
 
-def items_of(instrument: Instrument, finished: Sequence[str] = ()) -> tuple[Item, ...]:
+def items_of(instrument: Instrument, finished: Sequence[int] = ()) -> tuple[Item, ...]:
     """Return what a page shows of an instrument.
 
     Args:
         instrument: of the protocol.
-        finished: what a ranking puts in order, as ``Section 1``.
+        finished: numbers of the sections that a ranking puts in order.
     """
     return tuple(
         Item(
@@ -20,7 +20,7 @@ def items_of(instrument: Instrument, finished: Sequence[str] = ()) -> tuple[Item
             scale="points" if isinstance(item.scale, int) else item.scale,
             points=item.scale if isinstance(item.scale, int) else 0,
             labels=instrument.labels,
-            options=tuple(finished) if item.scale == "ranking" else item.options,
+            options=tuple(map(str, finished)) if item.scale == "ranking" else item.options,
             is_several=item.is_several,
             other=item.other,
             ends=(item.ends[0], item.ends[1]) if item.ends else ("", ""),

@@ -128,14 +128,15 @@ def participant_view(session: Session, answering: Answering, *, now: float) -> P
         total=len(steps),
         sections=len(plan.protocol.section),
         is_paused=session.progress.is_paused,
+        language=plan.protocol.language,
     )
     if step is None:
         return common
     said = session.heard.referee
     is_score = screen == "score" and said is not None
     form = screen in ("questionnaire", "ranking")
-    names = [f"Section {number}" for number in sections_to_rank(session)] if form else []
     protocol = plan.protocol
+    asked = protocol.instrument_named(step.instrument) if form else None
     return ParticipantView(
         screen=screen,
         session=common.session,
@@ -143,7 +144,8 @@ def participant_view(session: Session, answering: Answering, *, now: float) -> P
         title=step.title,
         text=step.text,
         statements=protocol.consent.statements if screen == "consent" else (),
-        items=items_of(protocol.instrument_named(step.instrument), names) if form else (),
+        items=items_of(asked, sections_to_rank(session)) if asked is not None else (),
+        is_paged=asked is not None and asked.is_paged,
         seconds_left=seconds_left(session, now),
         seconds=session.terms.countdown if screen == "countdown" else step.seconds,
         score=said.score if is_score and said is not None else None,
@@ -156,6 +158,7 @@ def participant_view(session: Session, answering: Answering, *, now: float) -> P
         is_recorded=step.is_recorded,
         is_paused=session.progress.is_paused,
         may=answering.may_participant(),
+        language=protocol.language,
     )
 
 

@@ -177,7 +177,7 @@ class Item(msgspec.Struct, frozen=True, kw_only=True):
     labels: tuple[str, ...] = ()
     """``points``: words for each of them; () for the page's own where there are five."""
     options: tuple[str, ...] = ()
-    """``choices``: what can be chosen. ``ranking``: what is put in order, as ``Section 1``."""
+    """``choices``: what can be chosen. ``ranking``: numbers of the sections to put in order."""
     is_several: bool = False
     """``choices``: more than one may be chosen."""
     other: str = ""
@@ -198,7 +198,8 @@ class ParticipantView(msgspec.Struct, frozen=True, kw_only=True):
     """Its id; asks name it, so that none counts for another step."""
     title: str = ""
     text: str = ""
-    """Of the protocol; an empty line parts paragraphs. Empty: the page has words of its own."""
+    """Of the protocol; an empty line parts paragraphs. Empty: the page has words of its own. For
+    ``countdown``, ``score`` and ``rest`` the page has a title of its own, too."""
     statements: tuple[str, ...] = ()
     """``consent``: each has to be ticked; () for the page's own one."""
     items: tuple[Item, ...] = ()
@@ -257,7 +258,7 @@ class ResearcherAsk(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     attempt: Annotated[int, msgspec.Meta(ge=0, le=1000)] = 0
     """Of that game; 0 is the one that is on."""
     reason: _Text = ""
-    """``repeat``, ``void``, ``pause``, ``abort``."""
+    """``repeat``, ``void``, ``next``, ``abort``."""
     text: _Text = ""
     """``note``."""
 

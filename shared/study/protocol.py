@@ -17,6 +17,7 @@ LONGEST_TEXT: Final = 20_000
 NAME: Final = "^[a-z0-9][a-z0-9-]{0,39}$"
 ITEM_ID: Final = "^[A-Za-z0-9][A-Za-z0-9_-]{0,39}$"
 ONE_LINE: Final = r"^[^\t\r\n]*$"
+LANGUAGE: Final = "^[a-z]{2,3}(-[A-Za-z0-9]{2,8})?$"
 
 Name = Annotated[str, msgspec.Meta(pattern=NAME)]
 """Small letters, digits and hyphens: it becomes a part of ids and of file names."""
@@ -27,6 +28,7 @@ OptionalLine = Annotated[str, msgspec.Meta(max_length=400, pattern=ONE_LINE)]
 Text = Annotated[str, msgspec.Meta(max_length=LONGEST_TEXT)]
 """Paragraphs for people, an empty line between them."""
 
+Language = Annotated[str, msgspec.Meta(pattern=LANGUAGE)]
 Scale = int | Literal["choices", "ranking", "open"]
 OrderKind = Literal["fixed", "random", "williams"]
 
@@ -197,6 +199,8 @@ class Instrument(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """Where the questions come from; for the methods paragraph."""
     labels: tuple[OptionalLine, ...] = ()
     """Of the points of a scale, from 1 up; none, or as many as there are points."""
+    is_paged: bool = False
+    """One question a screen, rather than a list (not for rankings)."""
     item: Annotated[tuple[Item, ...], msgspec.Meta(min_length=1, max_length=60)]
 
     @property
@@ -229,6 +233,8 @@ class Protocol(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """The publication that it follows."""
     people: int
     """How many participants are planned."""
+    language: Language = "en"
+    """Of the texts, and of the participant's page where ``static/words.js`` has it: en, de."""
     consent: Consent
     order: Order = Order()
     game: Game = Game()

@@ -13,7 +13,7 @@ from shared.config import toml
 from shared.config.location import line_of
 from shared.config.site import nearest
 from shared.errors import ConfigError
-from shared.study.protocol import ITEM_ID, NAME, ONE_LINE, Instrument, Protocol
+from shared.study.protocol import ITEM_ID, LANGUAGE, NAME, ONE_LINE, Instrument, Protocol
 
 SHIPPED: Final = ("study-one", "study-two", "template")
 """Names of the protocols that come with the program."""
@@ -29,6 +29,7 @@ _PATTERNS: Final = {
     NAME: "up to 40 small letters, digits and hyphens",
     ITEM_ID: "up to 40 letters, digits, hyphens and underscores",
     ONE_LINE: "one line without tabs",
+    LANGUAGE: "a language such as en or de-CH",
 }
 _PART = re.compile(r"\.?(?P<name>[^.\[\]]+)|\[(?P<index>\d+|\.\.\.)\]")
 

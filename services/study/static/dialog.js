@@ -3,6 +3,7 @@
 import { $, put } from "./dom.js";
 
 const ABOUT = {
+  next: ["Skip to the next step?", "What this step measures or asks stays as incomplete as it is now.", "Skip"],
   void: ["Void this game?", "It ends, or stops counting; its data are kept and marked void.", "Void the game"],
   repeat: ["Repeat this game?", "It stops counting, and is played again as a further attempt.", "Repeat the game"],
   abort: ["Abort the session?", "The session ends here for good; what was recorded is kept.", "Abort the session"],
@@ -12,7 +13,7 @@ export class Dialog {
   constructor() {
     this.element = $("dialog");
     this.done = null;
-    this.element.addEventListener("close", () => this.finish(null));
+    this.element.addEventListener("cancel", () => this.finish(null)); // Escape
     $("dialog-no").addEventListener("click", () => this.finish(null));
     $("reason").addEventListener("input", () => { $("dialog-yes").disabled = !$("reason").value.trim(); });
     this.element.querySelector("form").addEventListener("submit", (event) => {

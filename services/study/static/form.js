@@ -164,7 +164,7 @@ export class Form {
     const result = make("p", { class: "order", "aria-live": "polite" });
     const [least, most] = [item.ends[0] || this.words.least, item.ends[1] || this.words.most];
     const tell = () => result.replaceChildren(...this.order(item, kept.places));
-    const rows = item.options.map((option, k) => {
+    const rows = this.names(item).map((option, k) => {
       const row = make("div", { class: "rank", role: "radiogroup", "aria-label": option });
       row.append(make("span", { class: "name", textContent: option }));
       for (let place = 1; place <= count; place++) {
@@ -185,11 +185,15 @@ export class Form {
     return [make("p", { class: "how", textContent: this.words.sameRank }), grid, result];
   }
 
+  names(item) {
+    return item.options.map((section) => filled(this.words.section, { section }));
+  }
+
   /** Return the order in words, so that a tie is seen to be one. */
   order(item, places) {
     if (places.some((place) => !place)) return [];
     const levels = [...new Set(places)].sort((a, b) => a - b);
-    const groups = levels.map((level) => item.options.filter((_, k) => places[k] === level));
+    const groups = levels.map((level) => this.names(item).filter((_, k) => places[k] === level));
     const texts = groups.map((names) => {
       const joined = names.join(this.words.and);
       return names.length > 1 ? filled(this.words.equal, { names: joined }) : joined;

@@ -9,7 +9,7 @@ import { filled, wordsOf } from "./words.js";
 
 const FORMS = ["questionnaire", "ranking"];
 const ACTIONS = { consent: "consent", questionnaire: "answers", ranking: "ranking" };
-const LABELS = { welcome: "start", rest: "ready", waiting: "ready", consent: "consentButton" };
+const LABELS = { welcome: "start", rest: "ready", waiting: "ready", consent: "consentButton", thanks: "finish" };
 
 const drafts = new Drafts();
 const page = { view: null, words: wordsOf("en"), update: null, form: null, consent: null, isDone: false, refusal: [] };

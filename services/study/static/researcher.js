@@ -6,9 +6,10 @@ import { Link } from "./link.js";
 import { showBout, showGames, showNotes, showPlan } from "./session.js";
 import { showDevices, showGate, showHeart } from "./monitors.js";
 
-const STEERS = ["begin", "next", "pause", "resume"];
+const STEERS = ["begin", "pause", "resume"];
 const GATE = ["arm", "disarm", "reset"];
-const WITH_REASON = ["void", "repeat", "abort"];
+const WITH_REASON = ["next", "void", "repeat", "abort"];
+const OF_GAMES = ["void", "repeat"];
 const LOST = {
   lost: "NO CONNECTION TO THE STUDY. What you see is old; trying again …",
   silent: "THE STUDY DOES NOT RESPOND. What you see is old; see its terminal.",
@@ -67,9 +68,12 @@ function show(view) {
   showGames(view, (action, game) => ask(action, game));
   showNotes(view);
   put($("screen"), (SCREENS[view.screen] ?? view.screen) + (view.is_participant_here ? "" : " — BUT NO PARTICIPANT'S PAGE IS OPEN"));
+  put($("begin"), view.course === "new" ? "Begin the session" : "Begin this step");
+  const isPlaying = ["running", "paused"].includes(view.bout?.phase);
   for (const action of [...STEERS, ...GATE, ...WITH_REASON]) {
-    $(action).disabled = !view.may.includes(action);
-    $(action).hidden = !view.may.includes(action) && action !== "abort" && !GATE.includes(action);
+    const may = view.may.includes(action) && (isPlaying || !OF_GAMES.includes(action));
+    $(action).disabled = !may;
+    $(action).hidden = !may && action !== "abort" && !GATE.includes(action);
   }
 }
 

@@ -40,14 +40,15 @@ export const SCREENS = {
     return [[title(view.title), ...paragraphs(view.text), timer], set];
   },
   waiting: (view, words) => [[
-    make("div", { class: "breath", "aria-hidden": "true" }), title(view.title || words.waiting),
-    ...paragraphs(view.text || words.waitingText),
+    make("div", { class: "breath", "aria-hidden": "true" }), title(words.waiting), ...paragraphs(view.text || words.waitingText),
   ]],
-  thanks: (view, words) => [[title(view.title || words.thanks), ...paragraphs(view.text || words.thanksText)]],
+  thanks: (view, words) => [[
+    title(view.step ? view.title : words.thanks), ...paragraphs(view.step ? view.text : words.thanksText),
+  ]],
   countdown: (view, words) => {
     const digits = make("div", { class: "huge", role: "timer", "aria-live": "assertive" });
     const set = (now) => put(digits, Math.max(Math.ceil(now.seconds_left ?? 0), 1));
-    return [[title(view.title || words.countdown), warmUp(view, words), digits, tones(words)], set];
+    return [[title(words.countdown), warmUp(view, words), digits, tones(words)], set];
   },
   playing: (view, words) => {
     const digits = make("div", { class: "huge", role: "timer", "aria-live": "off" });
@@ -61,22 +62,23 @@ export const SCREENS = {
       scores.hidden = now.score === null;
       put(score, signed(now.score ?? 0));
     };
-    return [[warmUp(view, words), make("p", { class: "over", textContent: words.playing }), digits, make("div", { class: "bar" }, bar),
+    const explored = view.game ? [] : [title(view.title), ...paragraphs(view.text)]; // no game: the target is explored
+    return [[...explored, warmUp(view, words), make("p", { class: "over", textContent: words.playing }), digits, make("div", { class: "bar" }, bar),
       scores, tones(words)], set];
   },
   score: (view, words) => {
     const has = view.score !== null;
     const number = has ? make("div", { class: "huge", textContent: signed(view.score) }) : "";
-    return [[title(view.title || (has ? words.yourScore : words.gameOver)), warmUp(view, words), number, ...paragraphs(view.text)]];
+    return [[title(has ? words.yourScore : words.gameOver), warmUp(view, words), number]];
   },
   rest: (view, words) => {
     const [timer, set] = ring(words.timeLeft);
-    return [[title(view.title || words.rest), ...paragraphs(view.text || words.restText), timer], set];
+    return [[title(words.rest), ...paragraphs(view.text || words.restText), timer], set];
   },
 };
 
 function warmUp(view, words) {
-  return view.is_recorded ? "" : make("p", { class: "warm-up", textContent: words.warmUp });
+  return view.is_recorded || !view.game ? "" : make("p", { class: "warm-up", textContent: words.warmUp });
 }
 
 /** The consent: a text to be read to its end, then statements to be ticked. */

@@ -56,7 +56,7 @@ def test_nothing_that_is_said_becomes_html(opened: Opener, runner: Runner):
         participant("consent", title=evil, text=evil, statements=(evil,)),
         form(item, msgspec.structs.replace(points("p"), text=evil, labels=(evil,) * 5)),
         participant("ranking", items=(
-            Item(id="r", text=evil, scale="ranking", options=(evil, "b"), ends=(evil, evil)),
+            Item(id="r", text=evil, scale="ranking", options=("1", evil), ends=(evil, evil)),
         )),
     ):  # fmt: skip
         assert evil in visit.shows(view).text()

@@ -27,10 +27,10 @@ SHOWN = {
     "consent": ("Consent", "You may rest, or stop for good", "I agree", "name is not asked for"),
     "instruction": ("The game", "Stay behind the safety line", "Continue"),
     "baseline": ("Sit down", "2:15"),
-    "explore": ("Find the target", "42"),
     "countdown": ("Get ready", "3", "High tone", "Low tone", "Game 3 of 5"),
     "warm-up": ("does not count",),
     "playing": ("13", "Score", "214", "High tone"),
+    "exploring": ("Find the target", "The robot does not defend", "4:02", "High tone"),
     "playing-hidden": ("8", "Seconds left"),
     "score": ("Your score", "383"),
     "rest": ("Rest", "22", "I am ready"),
@@ -42,7 +42,8 @@ SHOWN = {
     "about-you": ("How old are you", "I would rather not say"),
     "waiting": ("One moment, please",),
     "paused": ("Paused", "lower your bat"),
-    "thanks": ("Thank you", "That was the last question"),
+    "debrief": ("Thank you", "That was the last question", "Done"),
+    "thanks": ("Thank you!", "The study is over"),
     "german": ("Stimme voll zu", "freiwillig", "Antworten senden", "Abschnitt 2 von 4"),
 }
 

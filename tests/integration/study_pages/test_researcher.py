@@ -58,11 +58,30 @@ def test_what_is_wrong_is_loud(visit: Visit, runner: Runner):
 def test_only_what_may_be_done_can_be_clicked(visit: Visit, runner: Runner):
     steers = ("begin", "next", "pause", "resume", "void", "repeat", "abort")
     gate = ("arm", "disarm", "reset")
-    for may in (("pause", "disarm", "abort"), ("begin", "arm"), ("resume", "reset"), ()):
+    for may in (("pause", "disarm", "abort", "void"), ("begin", "arm", "next"), ("resume",), ()):
         runner.change(may=may)
         visit.until(f"study.view().may.join() === '{','.join(may)}'")
         on = {action for action in (*steers, *gate) if visit.is_on(f"#{action}")}
         assert on == set(may)
+
+
+def test_a_game_that_is_over_is_voided_in_the_list_alone(visit: Visit, runner: Runner):
+    bout = runner.researcher.bout
+    assert bout is not None
+    runner.change(bout=msgspec.structs.replace(bout, phase="finished"))
+    visit.until("study.view().bout.phase === 'finished'")
+    assert visit.page.is_hidden("#void")
+    assert visit.page.is_hidden("#repeat")
+    assert visit.page.locator("#history button:has-text('void')").count() == 7
+
+
+def test_a_step_is_skipped_for_a_reason(visit: Visit, runner: Runner):
+    runner.change(may=("next",), course="running")
+    visit.page.click("#next")
+    visit.page.fill("#reason", "the participant cannot walk")
+    visit.page.click("#dialog-yes")
+    ask = runner.wanted()
+    assert (ask.action, ask.step, ask.reason) == ("next", "s2-g03", "the participant cannot walk")
 
 
 def test_a_click_says_which_step_it_is_about_and_twice_is_once(visit: Visit, runner: Runner):

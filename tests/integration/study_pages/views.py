@@ -30,7 +30,7 @@ def study_one() -> tuple[Protocol, tuple[Step, ...]]:
     return protocol, steps_of(protocol, [each.name for each in protocol.condition])
 
 
-def items(name: str, sections: Sequence[str] = ()) -> tuple[Item, ...]:
+def items(name: str, sections: Sequence[int] = ()) -> tuple[Item, ...]:
     return items_of(study_one()[0].instrument_named(name), sections)
 
 
@@ -61,15 +61,15 @@ def screens() -> dict[str, ParticipantView]:
             "text", title=seated.title, text=seated.text, seconds=180.0, seconds_left=134.2,
             step=seated.id, done=3,
         ),
-        "explore": participant(
-            "text", title=explore.title, text=explore.text, seconds=300.0, seconds_left=42.0,
-            step="explore", done=6,
-        ),
         "countdown": participant("countdown", seconds=5.0, seconds_left=2.4, **game),
         "warm-up": participant(
             "countdown", seconds=5.0, seconds_left=4.4, is_recorded=False, game=1, games=2, done=7
         ),
         "playing": participant("playing", seconds=20.0, seconds_left=12.6, score=214.0, **game),
+        "exploring": participant(
+            "playing", title=explore.title, text=explore.text, seconds=300.0, seconds_left=242.0,
+            step="explore", is_recorded=False, done=6,
+        ),
         "playing-hidden": participant("playing", seconds=20.0, seconds_left=7.2, **game),
         "score": participant("score", score=383.0, **game),
         "rest": participant("rest", seconds=30.0, seconds_left=21.3, may=("ready",), **game),
@@ -88,7 +88,7 @@ def screens() -> dict[str, ParticipantView]:
         "ranking": participant(
             "ranking", step="s4-r-comparison", title="Compare the sections", section=4, done=63,
             text="Put the sections you have finished in order.", may=("ranking",),
-            items=items("comparison", [f"Section {k}" for k in range(1, 5)]),
+            items=items("comparison", range(1, 5)),
         ),
         "open": participant(
             "questionnaire", step="q-improvement", title="In your own words", may=("answers",),
@@ -102,7 +102,11 @@ def screens() -> dict[str, ParticipantView]:
         "paused": participant(
             "playing", seconds=20.0, seconds_left=12.6, is_paused=True, **game
         ),
-        "thanks": participant("thanks", title=protocol.end.title, text=protocol.end.text, done=68),
+        "debrief": participant(
+            "thanks", title=protocol.end.title, text=protocol.end.text, done=67, may=("ready",),
+            step="debrief",
+        ),
+        "thanks": participant("thanks", step="", done=68),
         "german": participant(
             "questionnaire", step="q-tam-de", title="Ihre Meinung", language="de", section=2,
             items=[

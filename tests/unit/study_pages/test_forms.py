@@ -2,13 +2,14 @@ import pytest
 
 from services.study.forms import items_of, lacks_of
 from services.study.view import Answer, Item
-from shared.study.protocol_file import SHIPPED, load_protocol, shipped_protocol
+from shared.errors import ConfigError
+from shared.study.protocol_file import SHIPPED, load_protocol, read_protocol, shipped_protocol
 
 ITEMS = (
     Item(id="PU", text="", scale="points", points=5),
     Item(id="one", text="", scale="choices", options=("a", "b"), is_required=False),
     Item(id="adj", text="", scale="choices", options=("a", "b"), is_several=True, other="b"),
-    Item(id="rank", text="", scale="ranking", options=("Section 1", "Section 2")),
+    Item(id="rank", text="", scale="ranking", options=("1", "2")),
     Item(id="why", text="", scale="open", is_required=False),
 )
 WHOLE = (
@@ -60,12 +61,21 @@ def test_a_question_is_answered_once():
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_every_question_of_the_shipped_protocols_becomes_an_item(name: str):
-    sections = ("Section 1", "Section 2")
+    sections = (1, 2)
     for instrument in load_protocol(shipped_protocol(name)).instrument:
         items = items_of(instrument, sections)
         assert [item.text for item in items] == [item.text for item in instrument.item]
         for item, source in zip(items, instrument.item, strict=True):
             assert item.is_required != source.is_optional
             assert item.points == (source.scale if isinstance(source.scale, int) else 0)
-            assert item.options == (sections if source.scale == "ranking" else source.options)
+            assert item.options == (("1", "2") if source.scale == "ranking" else source.options)
             assert item.ends == (source.ends or ("", ""))
+
+
+def test_a_protocol_says_in_which_language_it_is():
+    data = shipped_protocol("template").read_bytes()
+    assert read_protocol(data, "t.toml").language == "en"
+    german = b'language = "de"\n' + data
+    assert read_protocol(german, "t.toml").language == "de"
+    with pytest.raises(ConfigError, match="a language such as en or de-CH"):
+        read_protocol(german.replace(b'"de"', b'"Deutsch"'), "t.toml")
