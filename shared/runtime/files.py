@@ -89,8 +89,9 @@ class RunLock:
                 f"{self.path.parent} is in use by process {holder}: "
                 "wait for it, stop it, or choose another folder with --out"
             ) from error
-        os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, f"{os.getpid()}\n".encode("ascii"), 0)
+        with contextlib.suppress(OSError):  # a full disk: the lock holds without our id in it
+            os.ftruncate(descriptor, 0)
+            os.pwrite(descriptor, f"{os.getpid()}\n".encode("ascii"), 0)
 
     def close(self) -> None:
         """Release it; a second call does nothing. The file stays, it is only a place to lock."""

@@ -1,8 +1,14 @@
 """What happens in a session: the kinds of events that its journal holds, one a line."""
 
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
 import msgspec
+
+Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
+"""Small enough to be a number anywhere."""
+Instant = Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
+"""Nanoseconds: on the wall clock since 1970, to the year 2262."""
+Number = Annotated[float, msgspec.Meta(ge=-1e15, le=1e15)]
 
 Outcome = Literal["finished", "void", "repeat"]
 """``finished``: it counts. ``void``: it does not, and is not played again. ``repeat``: it does not,
@@ -13,7 +19,7 @@ END_OUTCOMES: Final[tuple[Outcome, ...]] = ("finished", "void", "repeat")
 class Answer(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What somebody answered to one item; nothing set where it was left out."""
 
-    value: int | None = None
+    value: Count | None = None
     """On a scale of points, from 1, as ticked (a reversed item is turned by the analysis)."""
     chosen: tuple[str, ...] = ()
     """Of the options."""
@@ -25,7 +31,7 @@ class SessionBegan(msgspec.Struct, frozen=True, kw_only=True, tag="session_began
     """The first event of a journal."""
 
     participant: str
-    session: int
+    session: Count
     order: tuple[str, ...]
     """Labels of the conditions, blinded."""
     study: str
@@ -67,7 +73,7 @@ class Consented(msgspec.Struct, frozen=True, kw_only=True, tag="consented"):
 class Measured(msgspec.Struct, frozen=True, kw_only=True, tag="measured"):
     """A baseline is over; of one that was interrupted and begun again, only this counts."""
 
-    seconds: float
+    seconds: Number
     """How long it was."""
     beats: int
     """Measurements of the strap in it; 0: the baseline is missing."""
@@ -78,33 +84,33 @@ class Measured(msgspec.Struct, frozen=True, kw_only=True, tag="measured"):
 class GameStarted(msgspec.Struct, frozen=True, kw_only=True, tag="game_started"):
     """A bout was asked for at the referee; if it refuses, the game ends at once, void."""
 
-    attempt: int
+    attempt: Count
     """Of this game, from 1."""
     bout: str
     """Its name at the referee, and of its archive."""
     policy: str
     """Player reference of the robot: ``sha256:HASH`` or ``scripted:NAME``."""
-    seconds: float
-    speed: float = 1.0
+    seconds: Number
+    speed: Number = 1.0
 
 
 class GameEnded(msgspec.Struct, frozen=True, kw_only=True, tag="game_ended"):
     """A game that had started is over."""
 
-    attempt: int
+    attempt: Count
     bout: str
     policy: str
     outcome: Outcome
     reason: str = ""
     """Why it does not count."""
-    score: float | None = None
+    score: Number | None = None
     """The antagonist's; None where nobody judged it to its end."""
-    attack_steps: int | None = None
-    penalty_steps: int | None = None
-    camping_steps: int | None = None
-    steps: int | None = None
+    attack_steps: Count | None = None
+    penalty_steps: Count | None = None
+    camping_steps: Count | None = None
+    steps: Count | None = None
     """Control steps that were judged."""
-    seconds: float | None = None
+    seconds: Number | None = None
     """Game time (s)."""
     archive: str = ""
     """Folder of its archive in the session's folder: ``bouts/NAME``."""
@@ -122,7 +128,7 @@ class Ranked(msgspec.Struct, frozen=True, kw_only=True, tag="ranking"):
     """The finished sections were compared."""
 
     instrument: str
-    ranks: dict[str, dict[int, int]]
+    ranks: dict[str, dict[Count, Count]]
     """By id of the item: section -> rank, 1 the least; sections may share a rank."""
 
 
@@ -135,14 +141,14 @@ class Noted(msgspec.Struct, frozen=True, kw_only=True, tag="note"):
 class Voided(msgspec.Struct, frozen=True, kw_only=True, tag="voided"):
     """The researcher took a finished game out of the data; it is not played again."""
 
-    attempt: int
+    attempt: Count
     reason: str
 
 
 class Repeated(msgspec.Struct, frozen=True, kw_only=True, tag="repeated"):
     """The researcher took a game out of the data, and it is played again."""
 
-    attempt: int
+    attempt: Count
     """The one that is taken out."""
     reason: str
 
@@ -181,12 +187,11 @@ What = (
 class Event(msgspec.Struct, frozen=True, kw_only=True):
     """One line of a journal."""
 
-    number: int
+    number: Count
     """From 1, without a gap."""
-    t_ns: int
+    t_ns: Instant
     """Monotonic clock of the runner; begins anew with every ``session_resumed``."""
-    wall_ns: int
-    """Nanoseconds since 1970-01-01 UTC."""
+    wall_ns: Instant
     step: str = ""
     """Id of the step that it belongs to."""
     ask: str = ""

@@ -4,10 +4,13 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
+from shared.errors import StudyError
 from shared.study.events import (
+    Answered,
     Event,
     GameEnded,
     GameStarted,
+    Ranked,
     Repeated,
     Voided,
 )
@@ -40,7 +43,7 @@ class SessionRows:
         """Take a session's events, of which the first is ``session_began``.
 
         Raises:
-            StudyError: the events cannot follow each other.
+            StudyError: the events cannot follow each other, or are not of this protocol.
         """
         self._protocol = protocol
         self._steps = {step.id: step for step in steps}
@@ -50,8 +53,35 @@ class SessionRows:
         assert began is not None
         self._began = began
         self._labels = began.order
+        if len(self._labels) != len(protocol.section):
+            raise StudyError(
+                f"the journal of {began.participant} has {len(self._labels)} sections, the "
+                f"protocol {len(protocol.section)}: put back the protocol it began with"
+            )
+        for event in events:
+            self._check(event)
         self._settings = list(_settings(events))
         self._policies = _policies(self._progress, self._steps)
+
+    def _check(self, event: Event) -> None:
+        """Check that an event fits the protocol.
+
+        Raises:
+            StudyError: step, instrument or section are none of it.
+        """
+        what = event.what
+        place = f"the journal of {self._began.participant}, event {event.number} ({event.kind})"
+        needs_step = isinstance(what, GameStarted | GameEnded | Answered | Ranked)
+        if needs_step and event.step not in self._steps:
+            raise StudyError(f"{place}: {event.step[:80]!r} is no step of the protocol")
+        if isinstance(what, Answered | Ranked):
+            names = [instrument.name for instrument in self._protocol.instrument]
+            if what.instrument not in names:
+                raise StudyError(f"{place}: there is no instrument {what.instrument[:80]!r}")
+        if isinstance(what, Ranked):
+            sections = {section for ranks in what.ranks.values() for section in ranks}
+            if not sections <= set(range(1, len(self._labels) + 1)):
+                raise StudyError(f"{place}: it ranks sections that are none: {sorted(sections)}")
 
     def label(self, section: int) -> str:
         """Return the label of the condition of a section; empty for section 0."""

@@ -9,7 +9,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Final, TypeVar
+from typing import Any, Final, NamedTuple, TypeVar
 
 import msgspec
 
@@ -85,16 +85,24 @@ def decode_table(data: bytes, name: str, type: type[R]) -> list[R]:
     if not lines:
         return []
     header = lines[0].split("\t")
-    for column in columns_of(type):
+    cells: list[_Cell] = []
+    for field in msgspec.structs.fields(type):
+        column = field.encode_name
         if header.count(column) != 1:
             raise StudyError(
                 f"{name}:1: column {column!r} must be there once, and is {header.count(column)} "
                 f"times; expected are {', '.join(columns_of(type))}"
             )
-    return [
-        _row(line, number, header, name, type)
-        for number, line in enumerate(lines[1:], start=2)
-    ]  # fmt: skip
+        cells.append(_Cell(header.index(column), column, field.type))
+    rows: list[R] = []
+    for number, line in enumerate(lines[1:], start=2):
+        texts = line.split("\t")
+        if len(texts) != len(header):
+            raise StudyError(
+                f"{name}:{number}: {len(texts)} cells, expected {len(header)} as in the first line"
+            )
+        rows.append(type(**{cell.name: _read(cell, texts, f"{name}:{number}") for cell in cells}))
+    return rows
 
 
 class RowLog:
@@ -197,27 +205,21 @@ def _cell(value: object) -> str:
     return _SPECIAL.sub(lambda found: _ESCAPES[found.group()], str(value))
 
 
-def _row(line: str, number: int, header: Sequence[str], name: str, type: type[R]) -> R:
-    cells = line.split("\t")
-    if len(cells) != len(header):
-        raise StudyError(
-            f"{name}:{number}: {len(cells)} cells, expected {len(header)} as in the first line"
-        )
-    texts = dict(zip(header, cells, strict=True))
-    values: dict[str, object] = {}
-    for field in msgspec.structs.fields(type):
-        text = texts[field.encode_name]
-        try:
-            values[field.encode_name] = _value(text, field.type)
-        except (ValueError, KeyError):
-            raise StudyError(
-                f"{name}:{number}: column {field.encode_name!r} is {text[:80]!r}, "
-                f"expected {_spoken(field.type)}"
-            ) from None
+class _Cell(NamedTuple):
+    place: int
+    name: str
+    type: Any
+    """What it holds: types are values here."""
+
+
+def _read(cell: _Cell, texts: Sequence[str], line: str) -> object:
+    text = texts[cell.place]
     try:
-        return msgspec.convert(values, type)
-    except msgspec.ValidationError as error:
-        raise StudyError(f"{name}:{number}: {error}") from None
+        return _value(text, cell.type)
+    except (ValueError, KeyError):
+        raise StudyError(
+            f"{line}: column {cell.name!r} is {text[:80]!r}, expected {_spoken(cell.type)}"
+        ) from None
 
 
 def _value(text: str, annotation: object) -> object:

@@ -26,6 +26,7 @@ GROUPS = (
     Group("states", "snapshots, checkpoints, cuts, ledger", f"{_HERE}.states:targets", 30_000),
     Group("files", "model, bundle, calibration, JSON", f"{_HERE}.texts:files", 20_000),
     Group("sections", "sections of a site file", f"{_HERE}.texts:sections", 12_000),
+    Group("studies", "protocol, journal, tables of a study", f"{_HERE}.studies:targets", 12_000),
     Group("tables", "data sets, archived bouts, recordings", f"{_HERE}.tables:targets", 8_000),
 )
 """All entrances."""
@@ -65,6 +66,7 @@ NO_ENTRANCES: dict[str, str] = {
     "shared.sim.plant.export:patched_xml": "an MJCF file: MuJoCo's own parser, not fuzzed",
     "shared.sim.plant.plant:mjcf.read": "an MJCF file: MuJoCo's own parser, not fuzzed",
     "shared.styles.onnx:metadata": _OWN,
+    "shared.study.journal:": _BEHIND,
     "shared.telemetry.archive:table_of": _BEHIND,
     "shared.telemetry.rrd:end_of_messages": _OWN,
     "shared.telemetry.rrd:trim": _OWN,
