@@ -133,7 +133,9 @@ def participant_view(session: Session, answering: Answering, *, now: float) -> P
     if step is None:
         return common
     said = session.heard.referee
-    is_score = screen == "score" and said is not None
+    shown = {"never": (), "after": ("score",), "always": ("score", "playing")}
+    is_of_this_game = screen == "score" or (said and said.bout == session.moment.bout)
+    has_score = is_of_this_game and screen in shown[plan.protocol.game.score]
     form = screen in ("questionnaire", "ranking")
     protocol = plan.protocol
     asked = protocol.instrument_named(step.instrument) if form else None
@@ -148,7 +150,7 @@ def participant_view(session: Session, answering: Answering, *, now: float) -> P
         is_paged=asked is not None and asked.is_paged,
         seconds_left=seconds_left(session, now),
         seconds=session.terms.countdown if screen == "countdown" else step.seconds,
-        score=said.score if is_score and said is not None else None,
+        score=said.score if has_score and said is not None else None,
         section=step.section,
         sections=common.sections,
         game=step.game,

@@ -134,6 +134,8 @@ class Game(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     """One game."""
 
     seconds: float = 20.0
+    score: Literal["after", "always", "never"] = "after"
+    """When the participant's page shows it: after a game, while it is on as well, or not at all."""
 
     def __post_init__(self) -> None:
         """Check the range: the referee plays none that is longer."""

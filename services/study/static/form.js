@@ -142,7 +142,7 @@ export class Form {
 
   field(kept, changed, label) {
     const area = make("textarea", {
-      rows: 3, maxLength: MAX_TEXT, value: kept.text ?? "", placeholder: label, "aria-label": label, autocomplete: "off",
+      rows: 2, maxLength: MAX_TEXT, value: kept.text ?? "", placeholder: label, "aria-label": label, autocomplete: "off",
     });
     area.addEventListener("input", () => {
       kept.text = area.value;
@@ -154,7 +154,6 @@ export class Form {
   open(item, index, kept, changed) {
     const area = this.field(kept, changed, this.words.write);
     area.setAttribute("aria-labelledby", `q${index}`);
-    area.rows = 4;
     return [area];
   }
 

@@ -68,6 +68,7 @@ function show(view) {
   showGames(view, (action, game) => ask(action, game));
   showNotes(view);
   put($("screen"), (SCREENS[view.screen] ?? view.screen) + (view.is_participant_here ? "" : " — BUT NO PARTICIPANT'S PAGE IS OPEN"));
+  $("screen").className = view.is_participant_here ? "" : "bad";
   put($("begin"), view.course === "new" ? "Begin the session" : "Begin this step");
   const isPlaying = ["running", "paused"].includes(view.bout?.phase);
   for (const action of [...STEERS, ...GATE, ...WITH_REASON]) {

@@ -31,7 +31,7 @@ SHOWN = {
     "warm-up": ("does not count",),
     "playing": ("13", "Score", "214", "High tone"),
     "exploring": ("Find the target", "The robot does not defend", "4:02", "High tone"),
-    "playing-hidden": ("8", "Seconds left"),
+    "playing-hidden": ("8", "Time left"),
     "score": ("Your score", "383"),
     "rest": ("Rest", "22", "I am ready"),
     "adjectives": ("Intimidating", "Others (please describe)", "Send answers"),
