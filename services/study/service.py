@@ -118,16 +118,14 @@ class Study:
         """
         heard = self._hearing.listen()
         session = self.session
-        session.heard = heard
-        did = False
+        self._heart.add(heard.beats, session.step, session.progress, heard.beats_per_minute)
+        did = session.tick(heard)
         for _ in range(TAKE_MOST):
             if (ask := self._asks.take()) is None:
                 break
             did = True
             if (reply := self._answering.answer(ask)) is not None:
                 self._tell(reply)
-        self._heart.add(heard.beats, session.step, session.progress, heard.beats_per_minute)
-        did = session.tick(heard) or did
         for reply in self._answering.tick():
             did = True
             self._tell(reply)

@@ -11,7 +11,6 @@ from msgspec.structs import replace
 
 from services.study.course import (
     AGAIN_SECONDS,
-    FORMS,
     ON,
     Action,
     Begin,
@@ -186,16 +185,19 @@ class Session:
             self.moment = replace(self.moment, trouble=KILLED)
         self.moment = replace(self.moment, is_paused=self.progress.is_paused)
         step = self.step
-        if step is not None and step.kind in FORMS and self._is_filled_in(step):
-            self.finish(step)  # its answers were written, and its end was not
+        if step is not None and self._is_complete(step):
+            self.finish(step)  # what it is for was written, and its end was not
         if self.step is None and self.progress.state == "going":
             self.write(SessionEnded())
 
-    def _is_filled_in(self, step: Step) -> bool:
+    def _is_complete(self, step: Step) -> bool:
+        """Return whether the journal has what a step is for."""
         progress = self.progress
         if step.kind == "consent":
             return progress.has_consent
-        return step.id in progress.answers or step.id in progress.rankings
+        is_played = progress.finished(step.id) is not None
+        known = (progress.answers, progress.rankings, progress.baselines)
+        return is_played or any(step.id in one for one in known)
 
     # -- deciding and doing -----------------------------------------------------------------
 
