@@ -26,7 +26,7 @@ GIGABIT = 117e6
 TEN_GIGABIT = 1.17e9
 CENTRAL = 16.0
 """Cores of a central machine in the tables."""
-RETRY_SECONDS: float = inspect.signature(Outbox).parameters["retry_delay"].default
+RETRY_SECONDS: float = inspect.signature(Outbox).parameters["max_retry_delay"].default
 BOOTS: int = inspect.signature(Applied).parameters["max_boots"].default
 SESSIONS: int = json.loads(router_json(BusConfig()))["transport"]["unicast"]["max_sessions"]
 STEPS = LearnerConfig().epochs * LearnerConfig().minibatches
@@ -70,8 +70,8 @@ def limits(cost: Coefficients) -> str:
             f"{useful} actors at {job.rollout_samples} samples a rollout and "
             f"{job.batch_samples} a batch",
             "more rollouts are under way than two batches hold; the others are turned away and "
-            f"sent again whole every {RETRY_SECONDS:g} s, {number(retried / 1e6)} MB/s an actor: "
-            f"{number(GIGABIT / retried)} such actors fill 1 Gbit/s",
+            f"sent again whole, soon every {RETRY_SECONDS:g} s, {number(retried / 1e6)} MB/s an "
+            f"actor: {number(GIGABIT / retried)} such actors fill 1 Gbit/s",
             "a batch that grows with the actors (`learner.batch_samples`; "
             f"{number(job.for_actors(1000).batch_samples)} samples for 1,000 actors), rollouts of "
             "fewer bouts, or learners that fetch rollouts when they have room",

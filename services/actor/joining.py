@@ -2,17 +2,16 @@
 
 ``riposte actor --connect tls/HOST:7447 --certificates DIR`` needs no more than that: the run is
 heard on the bus, its settings come from its league, its players' snapshots as they are needed. The
-one folder it writes to is a scratch folder of its own, gone when it leaves in order.
+one folder it writes to is a scratch folder of its own, gone when it leaves in order; what killed
+ones have left behind, the next one on its machine removes, but for the newest.
 """
 
 import argparse
 import dataclasses
 import re
 import secrets
-import shutil
 import socket
 import sys
-import tempfile
 import threading
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,6 +19,7 @@ from typing import Any, cast
 
 import tomli_w
 
+from services.actor.scratch import Scratch, remove_stale
 from shared.bus.base import Bus, NoAnswer, Refused
 from shared.bus.config import BusConfig
 from shared.bus.runs import find_run
@@ -57,11 +57,11 @@ class Joined:
 
     argv: tuple[str, ...]
     """Command line of the service."""
-    scratch: Path
+    scratch: "Scratch"
 
     def leave(self) -> None:
         """Remove the scratch folder."""
-        shutil.rmtree(self.scratch, ignore_errors=True)
+        self.scratch.remove()
 
 
 def join(argv: Sequence[str], clock: Clock) -> Joined | None:
@@ -80,19 +80,20 @@ def join(argv: Sequence[str], clock: Clock) -> Joined | None:
         settings = _ask_settings(cfg, name, clock, run_id, stop) if run_id else None
     if settings is None or stop.is_set():
         return None
-    scratch = Path(tempfile.mkdtemp(prefix="riposte-actor-"))
+    remove_stale()
+    scratch = Scratch()
     try:
-        site = scratch / "site.toml"
-        model = scratch / "model.toml" if settings.model else None
+        site = scratch.path / "site.toml"
+        model = scratch.path / "model.toml" if settings.model else None
         tables = merged(settings, raw_sections(args.site, SECTIONS), model)
         if model is not None:
             atomic_write(model, settings.model.encode())
         atomic_write(site, tomli_w.dumps(tables).encode())
     except BaseException:
-        shutil.rmtree(scratch, ignore_errors=True)
+        scratch.remove()
         raise
-    _say(f"{name}: joins {run_id} at {', '.join(cfg.routers)} (log in {scratch}/logs)")
-    return Joined(_argv(args, site, name, scratch, run_id), scratch)
+    _say(f"{name}: joins {run_id} at {', '.join(cfg.routers)} (log in {scratch.path}/logs)")
+    return Joined(_argv(args, site, name, scratch.path, run_id), scratch)
 
 
 def merged(settings: RunSettings, own: Tables, model: Path | None) -> Tables:

@@ -1,7 +1,11 @@
-"""`riposte up`: starts the processes a site file lists for this machine and keeps them alive."""
+"""`riposte up`: starts the processes a site file lists for this machine and keeps them alive.
+
+Where the league is on another machine, actors join its run as any `riposte actor` does.
+"""
 
 import argparse
 import contextlib
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import get_args
@@ -56,8 +60,9 @@ class SiteConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 
 
 def specs(
-    cfg: SiteConfig, *, site: Path, run: Path, run_id: str, node: str, overrides: Sequence[str]
-) -> list[ProcessSpec]:
+    cfg: SiteConfig, *, site: Path, run: Path, run_id: str, node: str, overrides: Sequence[str],
+    join: str = "",
+) -> list[ProcessSpec]:  # fmt: skip
     """Return the processes of ``cfg``, each with a name of its own on this machine.
 
     Args:
@@ -67,12 +72,19 @@ def specs(
         run_id: name of the run on the bus.
         node: stands before every name, so that machines do not share one; may be empty.
         overrides: passed on.
+        join: name of the run that actors join where the league is elsewhere; empty: the one on.
     """
     made: list[ProcessSpec] = []
+    joins = "league" not in cfg.processes
     for entry in cfg.processes:
         role, _, agent = entry.partition(" ")
         taken = sum(spec.name.startswith(f"{node}{role}-") for spec in made)
         name = f"{node}{role}-{agent or taken}"
+        if role == "actor" and joins:
+            own = name if node else ""  # else it takes one that no other machine has
+            command = _joining(site, own, join, overrides)
+            made.append(ProcessSpec(name, command, finishes=False))
+            continue
         command = service_command(
             role.replace("-", "_"),
             name=name,
@@ -84,6 +96,14 @@ def specs(
         )
         made.append(ProcessSpec(name, command, finishes=False))
     return made
+
+
+def _joining(site: Path, name: str, run_id: str, overrides: Sequence[str]) -> tuple[str, ...]:
+    """Return the command line of an actor that joins the run that is on."""
+    command = [sys.executable, "-P", "-m", "services.actor", str(site.resolve())]
+    command += ["--name", name] if name else []
+    command += ["--run-id", run_id] if run_id else []
+    return (*command, *(word for one in overrides for word in ("--set", one)))
 
 
 def main(argv: Sequence[str]) -> int:
@@ -105,8 +125,9 @@ def main(argv: Sequence[str]) -> int:
     run_id = found.run_id or run_id_of(found.run)
     node = f"{found.node}-" if found.node else ""
     processes = specs(
-        cfg, site=found.site, run=found.run, run_id=run_id, node=node, overrides=found.overrides
-    )
+        cfg, site=found.site, run=found.run, run_id=run_id, node=node, overrides=found.overrides,
+        join=found.run_id,
+    )  # fmt: skip
     owns = any(entry.startswith(WRITERS) for entry in cfg.processes)
     with RunLock(found.run) if owns else contextlib.nullcontext():
         logs = found.run / "logs"

@@ -1,4 +1,4 @@
 """A Zenoh router in a Python process, for sites without zenohd.
 
-Reads and writes no topic itself: it carries all of them.
+Reads no topic, and writes its own status to every run that it carries.
 """

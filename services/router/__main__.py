@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from services.router.service import run
 from shared.bus.config import BusConfig, router_json
+from shared.clock import SystemClock
 from shared.runtime.serve import ServeArgs, parse_args, serve_plain
 
 
@@ -30,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
 
     def body(args: ServeArgs, stop: threading.Event) -> None:
-        run(config(args), stop)
+        run(config(args), stop, SystemClock(), args.name, args.log_path)
 
     return serve_plain("router", body, rest)
 

@@ -2,6 +2,7 @@
 
 import threading
 from collections import Counter
+from pathlib import Path
 
 import structlog
 
@@ -9,52 +10,97 @@ from services.router.listening import LibraryLog
 from shared.bus.config import BusConfig
 from shared.bus.refusals import LOG_FILTER, Refusals, read_log
 from shared.bus.routing import Router, open_router
+from shared.clock import Clock
+from shared.runtime.service import Health, StatusReporter
 
+TURN_SECONDS = 0.25
 LOOK_SECONDS = 1.0
 """Period of looking at what was refused; each session is in at most one line of each."""
 LOOKS_PER_COUNT = 10
-"""After so many looks the connected processes are counted."""
+"""After so many looks the connected processes are counted in the log."""
 
 log = structlog.get_logger()
 
 
-def run(cfg: BusConfig, stop: threading.Event) -> None:
+def run(cfg: BusConfig, stop: threading.Event, clock: Clock, name: str, log_path: Path) -> None:
     """Route on ``cfg.listen`` until ``stop`` is set.
+
+    Args:
+        cfg: of the bus.
+        stop: set when it shall end.
+        clock: a clock that moves by itself.
+        name: of this process.
+        log_path: its log file, whose time says that the loop turns.
 
     Raises:
         ConfigError: it cannot listen there.
     """
     library = LibraryLog() if cfg.certificates else None
-    router = open_router(cfg, LOG_FILTER if library else "off")
+    router = open_router(cfg, LOG_FILTER if library else "off", name)
+    watch = Watch(router, library)
+    reporter = StatusReporter(watch, router, clock, "router", log_path)
     log.info("router_started", endpoints=list(router.endpoints))
-    connected: Counter[str] = Counter({"": -1})
-    looks = 0
+    look_at = clock.now()
     try:
-        while not stop.wait(LOOK_SECONDS):
-            if library is not None:
-                tell(router, *library.take())
-            looks += 1
-            if looks % LOOKS_PER_COUNT == 0 and (now := router.sessions()) != connected:
-                connected = now
-                roles = {role: count for role, count in sorted(now.items()) if role}
-                log.info("sessions_counted", sessions=now.total(), **roles)
+        while not stop.wait(TURN_SECONDS):
+            reporter.tick()
+            if clock.now() >= look_at:
+                look_at = clock.now() + LOOK_SECONDS
+                watch.look()
     finally:
-        if library is not None:
-            tell(router, *library.take())
+        watch.look()
         router.close()
         log.info("router_stopped")
 
 
-def tell(router: Router, lines: bytes, lost: int) -> None:
-    """Log who came and went, and who was refused how much."""
-    for what, role, address in router.peers.news():
-        log.info(f"session_{what}", role=role, address=address)
-    found: Refusals = read_log(lines)
-    for zid, count in found.messages.items():
-        log.warning("messages_refused", count=count, **router.peers.who(zid))
-    for zid in found.strangers:
-        log.warning("stranger_connected", zid=zid, may="nothing", **router.peers.who(zid))
-    for reason, count in found.connections.items():
-        log.warning("connection_refused", reason=reason, count=count)
-    if lost:
-        log.warning("refusals_not_logged", log_bytes=lost)
+class Watch:
+    """Looks after one router."""
+
+    def __init__(self, router: Router, library: LibraryLog | None) -> None:
+        """Have seen nothing; ``library`` is what Zenoh says, where there are certificates."""
+        self._router = router
+        self._library = library
+        self._counted: Counter[str] = Counter({"": -1})
+        self._looks = 0
+        self._refused: Counter[str] = Counter(
+            refused_messages=0, refused_connections=0, refused_strangers=0
+        )
+
+    def look(self) -> None:
+        """Log who came and went and who was refused, and now and then how many are there."""
+        if self._library is not None:
+            self._tell(*self._library.take())
+        self._looks += 1
+        if self._looks % LOOKS_PER_COUNT == 0 and (now := self._router.sessions()) != self._counted:
+            self._counted = now
+            log.info("sessions_counted", sessions=now.total(), **_by_role(now))
+
+    def health(self) -> Health:
+        """Return who is connected, and what was refused."""
+        now = self._router.sessions()
+        roles = ", ".join(f"{count} {role}" for role, count in _by_role(now).items())
+        return Health(
+            state=f"carries {now.total()} sessions" + (f": {roles}" if roles else ""),
+            counters={"sessions": now.total(), **self._refused},
+        )
+
+    def _tell(self, lines: bytes, lost: int) -> None:
+        router = self._router
+        for what, role, address in router.peers.news():
+            log.info(f"session_{what}", role=role, address=address)
+        found: Refusals = read_log(lines)
+        for zid, count in found.messages.items():
+            self._refused["refused_messages"] += count
+            log.warning("messages_refused", count=count, **router.peers.who(zid))
+        for zid in found.strangers:
+            self._refused["refused_strangers"] += 1
+            log.warning("stranger_connected", zid=zid, may="nothing", **router.peers.who(zid))
+        for reason, count in found.connections.items():
+            self._refused["refused_connections"] += count
+            log.warning("connection_refused", reason=reason, count=count)
+        if lost:
+            log.warning("refusals_not_logged", log_bytes=lost)
+
+
+def _by_role(sessions: Counter[str]) -> dict[str, int]:
+    return {role: count for role, count in sorted(sessions.items()) if role}

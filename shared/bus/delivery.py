@@ -32,6 +32,8 @@ class _Entry(Generic[In, Out]):
         self.message = message
         self.put_at = at
         self.ask_at = at
+        self.delay = 0.0
+        """Before the next try (s)."""
         self.pending: Pending[Out] | None = None
 
 
@@ -40,7 +42,7 @@ class Outbox(Generic[In, Out]):
 
     def __init__(
         self, bus: Bus, service: Service[In, Out], clock: Clock, *, window: int, timeout: float,
-        retry_delay: float = 0.2, **fields: str,
+        retry_delay: float = 0.2, max_retry_delay: float = 2.0, **fields: str,
     ) -> None:  # fmt: skip
         """Make an empty outbox.
 
@@ -50,7 +52,10 @@ class Outbox(Generic[In, Out]):
             clock: decides when to ask again.
             window: how many messages may be without an answer.
             timeout: seconds after which a message is asked again.
-            retry_delay: seconds between no answer and the next try.
+            retry_delay: seconds between no answer and the next try; twice as long each time, as
+                the whole message travels again.
+            max_retry_delay: the longest of them (s); what is refused until a process is up again
+                waits no longer than this for it.
             fields: of the service's key.
         """
         self.window = window
@@ -61,6 +66,7 @@ class Outbox(Generic[In, Out]):
         self._clock = clock
         self._timeout = timeout
         self._retry_delay = retry_delay
+        self._max_retry_delay = max_retry_delay
         self._fields = fields
         self._entries: list[_Entry[In, Out]] = []
         self._refused: list[tuple[In, str]] = []
@@ -112,7 +118,8 @@ class Outbox(Generic[In, Out]):
             elif isinstance(answer, NoAnswer) or (isinstance(answer, Refused) and answer.retry):
                 self.last_failure = answer.reason
                 entry.pending = None
-                entry.ask_at = now + self._retry_delay
+                entry.delay = min(2.0 * entry.delay or self._retry_delay, self._max_retry_delay)
+                entry.ask_at = now + entry.delay
                 left.append(entry)
             elif isinstance(answer, Refused):
                 self.last_failure = answer.reason

@@ -4,17 +4,21 @@ import dataclasses
 import os
 import socket
 import threading
+from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from shared.bus.base import Bus
 from shared.clock import Clock
 from shared.messages.live import ServiceStatus
-from shared.messages.topics import STATUS
+from shared.messages.message import Message
+from shared.messages.topics import STATUS, Topic
 from shared.runtime.beat import Beat
 from shared.runtime.build import commit
 from shared.runtime.process import Usage, usage
+
+Out = TypeVar("Out", bound=Message)
 
 IDLE_SECONDS = 0.05
 """How long a service with nothing to do waits for the bus."""
@@ -38,6 +42,30 @@ class Health:
     last_error: str = ""
     policies: dict[str, int] = dataclasses.field(default_factory=dict[str, int])
     """By agent, the newest policy version that it has."""
+
+
+class Speaker(Protocol):
+    """What a status goes out by: a process's end of the bus, or the router itself."""
+
+    name: str
+    boot: str
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """Return counts since the start."""
+        ...
+
+    def publish(self, topic: Topic[Out], message: Out, **fields: str) -> None:
+        """Send a value."""
+        ...
+
+
+class Healthy(Protocol):
+    """Somebody who says how it is."""
+
+    def health(self) -> Health:
+        """Return how it is; called once a second, so it must be cheap."""
+        ...
 
 
 class Ticking(Protocol):
@@ -87,7 +115,7 @@ class StatusReporter:
     """Publishes the ServiceStatus of one service every second, and beats."""
 
     def __init__(
-        self, service: Ticking, bus: Bus, clock: Clock, role: str, log: Path | None = None
+        self, service: Healthy, bus: Speaker, clock: Clock, role: str, log: Path | None = None
     ) -> None:
         """Be due at once; ``log`` is the file whose time says that the loop turns."""
         self._service = service

@@ -1,6 +1,7 @@
 """The processes of a match, in the order they are started; they end in reverse."""
 
 from services.jobs.play.plan import Plan
+from services.jobs.train.processes import listen_words
 from services.supervisor import ProcessSpec, service_command
 from shared.messages.training import AGENTS
 
@@ -21,7 +22,7 @@ def processes(plan: Plan, endpoint: str) -> list[ProcessSpec]:
             role, name=name, run=plan.folder, site=plan.folder / "config.toml", run_id=plan.run,
             connect=() if role == "router" else (endpoint,), agent=agent,
         )  # fmt: skip
-        extra = ("--listen", endpoint) if role == "router" else ()
+        extra = listen_words(plan.bus, endpoint) if role == "router" else ()
         return ProcessSpec(name, (*command, *extra), finishes=False)
 
     made = [spec("router", "router-0")]

@@ -24,7 +24,7 @@ from services.jobs.tournament.files import PAGE_FILE, TABLE_FILE, write_results
 from services.jobs.tournament.plan import Plan, Pools, batch_size, check_asked
 from services.jobs.tournament.results import PLAN_FILE
 from services.jobs.tournament.words import standings_text
-from services.jobs.train.processes import StopAsked, run_processes
+from services.jobs.train.processes import StopAsked, listen_words, run_processes
 from services.league.events import RunStarted
 from services.league.history import RunState
 from services.league.ledger import Ledger
@@ -218,7 +218,7 @@ def _play(folder: Path, state: RunState, actors: int, stop: threading.Event, aga
                 role, name=name, run=folder, site=folder / "config.toml", run_id=state.run,
                 connect=connect,
             )  # fmt: skip
-            extra = ("--listen", endpoint) if role == "router" else ()
+            extra = listen_words(settings.bus, endpoint) if role == "router" else ()
             return ProcessSpec(name, (*command, *extra))
 
         made = [spec("router", "router-0"), spec("league", "league-0")]

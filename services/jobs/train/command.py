@@ -26,7 +26,7 @@ from services.jobs.train.arguments import (
     parse,
     settings_of,
 )
-from services.jobs.train.processes import StopAsked, run_processes
+from services.jobs.train.processes import StopAsked, listen_words, run_processes
 from services.supervisor import ProcessSpec, service_command
 from shared.bus.base import Bus
 from shared.clock import Clock, SystemClock
@@ -124,7 +124,7 @@ def processes(settings: Settings, folder: Path, run: str, endpoint: str) -> list
             role, name=name, run=folder, site=folder / "config.toml", run_id=run,
             connect=() if role == "router" else (endpoint,), **more,
         )  # fmt: skip
-        extra = ("--listen", endpoint) if role == "router" else ()
+        extra = listen_words(settings.bus, endpoint) if role == "router" else ()
         return ProcessSpec(name, (*command, *extra), finishes=False)
 
     made = [spec("router", "router-0"), spec("league", "league-0")]

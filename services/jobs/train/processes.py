@@ -119,7 +119,7 @@ def run_processes(
 
 
 def endpoint_of(cfg: BusConfig) -> str:
-    """Return where the run's router listens: a free port, or where the site file says.
+    """Return where this machine's processes reach the router: a free port, or by the site file.
 
     Raises:
         ConfigError: another program listens there.
@@ -134,6 +134,17 @@ def endpoint_of(cfg: BusConfig) -> str:
             "or leave bus.listen out to get a free one"
         )
     return endpoint
+
+
+def listen_words(cfg: BusConfig, endpoint: str) -> tuple[str, ...]:
+    """Return where a router listens, on its command line: at every endpoint of the site file.
+
+    Args:
+        cfg: of the bus.
+        endpoint: of ``endpoint_of``, where the processes of this machine reach it.
+    """
+    others = cfg.listen[1:] if cfg.listen[:1] == (endpoint,) else ()
+    return tuple(word for one in (endpoint, *others) for word in ("--listen", one))
 
 
 def wait_for_router(endpoint: str, supervisor: Supervisor, stop: threading.Event) -> None:

@@ -43,7 +43,8 @@ def test_an_actor_of_another_host_is_seen_by_status_and_leaves_when_told(cluster
     seen = {
         (one["host"], one["name"]): one for one in cluster.status("--run-id", "run")["services"]
     }
-    assert seen.keys() == {("learner", "league-0"), ("desk", log.stem)}
+    assert seen.keys() == {("learner", "router-0"), ("learner", "league-0"), ("desk", log.stem)}
+    assert seen["learner", "router-0"]["state"].startswith("carries ")
     assert seen["desk", log.stem]["waiting_for"].startswith("league: ")
     actor.terminate()
     assert actor.wait(60) == 0, cluster.said(desk)

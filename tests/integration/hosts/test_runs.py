@@ -1,8 +1,12 @@
 """Which run an actor joins, and how long it waits for one: a real bus on this machine."""
 
 import contextlib
+import json
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -48,6 +52,34 @@ def endpoint() -> Iterator[str]:
         yield endpoint
         over.set()
         thread.join(10.0)
+
+
+@pytest.mark.slow
+def test_a_router_is_in_the_status_of_every_run_that_it_carries(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    words = ("--name", "router-7", "--run", str(tmp_path), "--run-id", "its-own")
+    router = subprocess.Popen(
+        [sys.executable, "-m", "services.router", *words, "--listen", endpoint]
+    )
+    try:
+        with contextlib.ExitStack() as stack:
+            cfg = BusConfig(connect=(endpoint,), open_seconds=60.0)
+            for run in ("one", "two"):
+                bus = open_zenoh(cfg, "actor-0", SystemClock(), run)
+                stack.enter_context(contextlib.closing(bus)).declare_alive("actor")
+            for run in ("one", "two"):
+                assert status.main(["--connect", endpoint, "--run-id", run, "--json"]) == 0
+                printed = capsys.readouterr().out.splitlines()[-1]  # its log stands before
+                (said,) = json.loads(printed)["services"]
+                assert (said["role"], said["name"]) == ("router", "router-7")
+                assert said["counters"]["sessions"] == 3
+        # A run of which nobody is left is none, and a router alone makes none.
+        assert status.main(["--connect", endpoint, "--run-id", "its-own", "--json"]) == 1
+    finally:
+        router.terminate()
+        assert router.wait(30) == 0
 
 
 def test_of_several_runs_none_is_guessed(

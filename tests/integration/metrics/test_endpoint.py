@@ -35,16 +35,19 @@ class Site:
         self.systemd = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self.systemd.bind(str(folder / "notify"))
         self.systemd.settimeout(30.0)
-        self._environment = {**os.environ, "NOTIFY_SOCKET": str(folder / "notify")}
         run = ("--run", str(folder), "--run-id", "r1")
         self._router = self._start("router", *run, "--listen", self.endpoint)
         settings = ("--set", f"metrics.port={self.port}", "--set", "bus.open_seconds=60")
-        self.metrics = self._start("metrics", *run, "--connect", self.endpoint, *settings)
-
-    def _start(self, module: str, *words: str) -> "subprocess.Popen[bytes]":
-        return subprocess.Popen(
-            [sys.executable, "-m", f"services.{module}", *words], cwd=ROOT, env=self._environment
+        watched = {"NOTIFY_SOCKET": str(folder / "notify")}
+        self.metrics = self._start(
+            "metrics", *run, "--connect", self.endpoint, *settings, **watched
         )
+
+    def _start(self, module: str, *words: str, **environment: str) -> "subprocess.Popen[bytes]":
+        return subprocess.Popen(
+            [sys.executable, "-m", f"services.{module}", *words], cwd=ROOT,
+            env={**os.environ, **environment},
+        )  # fmt: skip
 
     def get(self, path: str) -> tuple[int, bytes]:
         try:

@@ -1,5 +1,7 @@
 """Acknowledged delivery: the outbox, the record of what was applied, and both under faults."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -118,6 +120,25 @@ def test_a_busy_answerer_is_asked_again_and_one_that_refuses_is_not() -> None:
             assert len(site.outbox.pump()) == 1
     assert site.outbox.take_refused() == [(an_incident(0), "not now")]
     assert site.outbox.take_refused() == []
+
+
+def test_a_message_that_is_refused_again_and_again_travels_ever_more_seldom() -> None:
+    site = Site(timeout=10.0)
+    inbox = site.answerer.answer(INCIDENT)
+    site.outbox.put(an_incident(0))
+    asked_at: list[float] = []
+    for _ in range(1000):  # ten seconds
+        if (request := inbox.take()) is not None:
+            asked_at.append(round(site.clock.now(), 2))
+            request.refuse("not now", retry=True)
+        assert site.outbox.pump() == []
+        site.clock.advance(0.01)
+    waits = [round(later - earlier, 1) for earlier, later in itertools.pairwise(asked_at)]
+    assert waits == [0.2, 0.4, 0.8, 1.6, 2.0, 2.0, 2.0]
+    site.outbox.put(an_incident(1))  # another message does not wait for it
+    request = inbox.take()
+    assert request is not None
+    assert request.message.sequence == 1
 
 
 def test_applied_remembers_exactly_what_was_added() -> None:

@@ -2,6 +2,7 @@ from pathlib import Path
 
 import pytest
 
+from services.actor import joining
 from services.jobs.up import SiteConfig, specs
 
 
@@ -16,6 +17,21 @@ def test_each_process_gets_a_name_of_its_own_and_the_same_run(tmp_path: Path):
     for spec in made:
         assert str(site) in spec.argv
         assert spec.argv[-2:] == ("--set", "a.b=1")
+
+
+def test_actors_join_where_the_league_is_on_another_machine(tmp_path: Path):
+    site = tmp_path / "s.toml"
+    cfg = SiteConfig(processes=("actor", "actor"))
+    alone = specs(cfg, site=site, run=tmp_path, run_id="x", node="", overrides=["a.b=1"])
+    assert [spec.name for spec in alone] == ["actor-0", "actor-1"]
+    for spec in alone:
+        assert joining.is_joining(spec.argv[4:])
+        assert spec.argv[4:] == (str(site), "--set", "a.b=1")
+    named = specs(cfg, site=site, run=tmp_path, run_id="r", node="n1-", overrides=[], join="r")
+    assert named[1].argv[4:] == (str(site), "--name", "n1-actor-1", "--run-id", "r")
+    with_league = SiteConfig(processes=("league", "actor"))
+    made = specs(with_league, site=site, run=tmp_path, run_id="r", node="", overrides=[])
+    assert not joining.is_joining(made[1].argv[4:])
 
 
 def test_a_live_bout_is_a_site_of_its_own(tmp_path: Path):
