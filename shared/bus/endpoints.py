@@ -5,9 +5,10 @@ They are the same on every bus; a bus brings bytes to them and takes bytes away.
 """
 
 import dataclasses
+import functools
 import threading
 from collections.abc import Callable
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar, cast
 
 import structlog
 
@@ -25,8 +26,22 @@ Out = TypeVar("Out", bound=Message)
 
 MAX_REFUSAL = 64 << 10
 """Longest encoded refusal (bytes)."""
+MAX_SHARED = 4 << 10
+"""Longest value whose message the subscriptions of a process share (bytes)."""
 
 log = structlog.get_logger()
+
+
+def _decoded(topic: Topic[Out], payload: bytes) -> Out:
+    """Return the message in a value; the bus in memory brings the same bytes to many."""
+    if len(payload) > MAX_SHARED:
+        return decode(topic.message, payload, topic.max_bytes)
+    return cast("Out", _shared(topic.message, payload, topic.max_bytes))
+
+
+@functools.lru_cache(maxsize=16)
+def _shared(message: type[Message], payload: bytes, max_bytes: int) -> Message:
+    return decode(message, payload, max_bytes)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -105,7 +120,7 @@ class Values(Generic[Out]):
         queue = self._newest or self._fifo
         while (payload := queue.pop()) is not None:
             try:
-                message = decode(self._topic.message, payload, self._topic.max_bytes)
+                message = _decoded(self._topic, payload)
             except MessageError as error:
                 self._host.counts.add("refused_messages")
                 log.warning("value_refused", key=self.pattern, reason=str(error))
