@@ -143,7 +143,10 @@ def _noncentrality(
         if not (math.isfinite(below) and math.isfinite(above)):
             return None
         if below >= 0.0 >= above:
-            root: Any = optimize.brentq(excess, low, high, xtol=1e-10)
+            try:
+                root: Any = optimize.brentq(excess, low, high, xtol=1e-10)
+            except ValueError:  # NaN on the way: scipy's noncentral t has no digits left there
+                return None
             return float(root)
         width *= 2.0
         low, high = (low - width if below < 0.0 else low), (high + width if above > 0.0 else high)
