@@ -6,17 +6,13 @@ from typing import Any, Final
 import msgspec
 import tomli_w
 
-from services.jobs.play.seats import seat_of
-from services.policy.loading import Loader
+from services.jobs.study.players import seats_of
 from services.robot_io.config import RobotIoConfig, SafetyConfig
 from services.study.config import StudyConfig
 from shared.config.site import load_section, raw_sections
 from shared.errors import ConfigError
 from shared.game.rules import RuleBook
-from shared.policy.action import ActionConfig
-from shared.policy.snapshot import Fit
 from shared.runtime.files import atomic_write
-from shared.sim.arena import arena_of
 from shared.sim.config import SimConfig
 from shared.study.people.population import Population
 from shared.study.protocol import Protocol
@@ -25,7 +21,6 @@ FILE: Final = "rehearsal.toml"
 BARE: Final = ('game.camping="once"',)
 """Without a site file: the real robot's twin behind its gate, and the camping rule of the paper's
 prose, under which its heuristic is a strong player (docs/players.md)."""
-_RUNS: Final = Path("runs")
 _SECTIONS: Final = ("robot_io", "safety", "sim", "game", "study", "people")
 
 
@@ -67,24 +62,16 @@ def make_plan(
         if word.partition(".")[0] not in _SECTIONS:
             raise ConfigError(f"{word!r} says nothing of {', '.join(_SECTIONS)}")
     words = (*(BARE if site is None else ()), *rest, 'robot_io.tracker="mouse"')
-    sim = load_section(site, "sim", SimConfig, words)
-    action = ActionConfig()
-    loader = Loader(
-        "protagonist", Fit.of(action, sim.control_timestep, None), arena_of(sim, action), _RUNS
-    )
-    named = {each.player for each in protocol.condition}
-    if protocol.warm_up is not None:
-        named.add(protocol.warm_up.player)
     return RehearsalPlan(
         seed=seed,
         is_archived=is_archived,
         robot_io=load_section(site, "robot_io", RobotIoConfig, words),
         safety=load_section(site, "safety", SafetyConfig, words),
-        sim=sim,
+        sim=load_section(site, "sim", SimConfig, words),
         game=load_section(site, "game", RuleBook, words),
         study=load_section(site, "study", StudyConfig, words),
         people=_population(own),
-        players={name: seat_of(name, loader, _RUNS).player for name in sorted(named)},
+        players={name: seat.player for name, seat in seats_of(protocol, site, words).items()},
     )
 
 
