@@ -43,7 +43,8 @@ def clock_problem(now_ns: int, last_ns: int) -> str | None:
     if back > MAX_BACK:
         return (
             f"the clock of this machine shows {text_of(now_ns)}, {_spoken(back)} before the last "
-            f"event ({text_of(min(last_ns, _LATEST_NS))}): set it right (timedatectl)"
+            f"event ({text_of(min(last_ns, _LATEST_NS))}): set it right (timedatectl); where it is "
+            "right now and was wrong then, this session cannot be gone on with"
         )
     return None
 

@@ -12,11 +12,12 @@ from shared.study.events import (
     GameStarted,
     Ranked,
     Repeated,
+    SessionBegan,
     Voided,
 )
 from shared.study.folder import PARTICIPANTS, Study
 from shared.study.instants import text_of
-from shared.study.journal import read_journal
+from shared.study.journal import FILE, read_journal
 from shared.study.progress import Attempt, Progress, replay
 from shared.study.protocol import Item, Protocol
 from shared.study.rows import (
@@ -209,12 +210,46 @@ def rows_of(study: Study, participant: str, session: int = 1) -> SessionRows | N
     """Return the rows of a session; None where it has not begun.
 
     Raises:
-        StudyError: the journal is damaged, or nobody of that name is expected.
+        StudyError: the journal is damaged or another's, or nobody of that name is expected.
     """
-    events = read_journal(study.session_folder(participant, session))
+    folder = study.session_folder(participant, session)
+    events = read_journal(folder)
     if not events:
         return None
+    began = events[0].what
+    assert isinstance(began, SessionBegan)
+    expected = (participant, session, study.labels_of(participant))
+    if (began.participant, began.session, began.order) != expected:
+        raise StudyError(
+            f"{folder / FILE} is of {began.participant}, session {began.session}, order "
+            f"{','.join(began.order)}; expected {participant}, session {session}, order "
+            f"{','.join(expected[2])} (allocation.tsv): put back what was there"
+        )
     return SessionRows(study.protocol, study.steps_of(participant), events)
+
+
+def require_unplayed(study: Study, participant: str, session: int = 1) -> None:
+    """Check that a session may begin, or be gone on with.
+
+    Raises:
+        StudyError: it has ended, or everything is to be deleted; or nobody of that name is
+            expected, or the journal is damaged.
+    """
+    study.labels_of(participant)
+    rows = rows_of(study, participant, session)
+    state = rows.participant().state if rows is not None else "new"
+    if state == "ended":
+        played = {name for name, _, _ in study.sessions()}
+        free = (name for name, _ in study.assignments if name not in played)
+        raise StudyError(
+            f"{participant} has played: their session ended; next is "
+            f"{next(free, 'nobody: draw more orders (`riposte study allocate`)')}"
+        )
+    if state == "withdrawn":
+        raise StudyError(
+            f"{participant} withdrew: say `riposte study withdraw {study.folder} "
+            f"--participant {participant}`"
+        )
 
 
 def write_session(study: Study, participant: str, session: int = 1) -> None:
