@@ -228,30 +228,6 @@ def rows_of(study: Study, participant: str, session: int = 1) -> SessionRows | N
     return SessionRows(study.protocol, study.steps_of(participant), events)
 
 
-def require_unplayed(study: Study, participant: str, session: int = 1) -> None:
-    """Check that a session may begin, or be gone on with.
-
-    Raises:
-        StudyError: it has ended, or everything is to be deleted; or nobody of that name is
-            expected, or the journal is damaged.
-    """
-    study.labels_of(participant)
-    rows = rows_of(study, participant, session)
-    state = rows.participant().state if rows is not None else "new"
-    if state == "ended":
-        played = {name for name, _, _ in study.sessions()}
-        free = (name for name, _ in study.assignments if name not in played)
-        raise StudyError(
-            f"{participant} has played: their session ended; next is "
-            f"{next(free, 'nobody: draw more orders (`riposte study allocate`)')}"
-        )
-    if state == "withdrawn":
-        raise StudyError(
-            f"{participant} withdrew: say `riposte study withdraw {study.folder} "
-            f"--participant {participant}`"
-        )
-
-
 def write_session(study: Study, participant: str, session: int = 1) -> None:
     """Write the tables of a session from its journal; heart rate is written as it comes.
 

@@ -12,7 +12,7 @@ from shared.errors import ConfigError, StudyError
 from shared.study.drawing import draw_orders
 from shared.study.folder import make_study, open_study
 from shared.study.protocol_file import shipped_protocol
-from shared.study.recorded import refresh, require_unplayed
+from shared.study.recorded import refresh
 from shared.study.tables import load_study
 from tests.unit.study.made import AT, play, study_in
 
@@ -197,17 +197,3 @@ def test_a_journal_that_was_copied_to_another_participant_is_refused(played):
     shutil.copytree(played.folder / "sub-01", played.folder / "sub-03")
     with pytest.raises(StudyError, match="is of sub-01, session 1"):
         refresh(played)
-
-
-def test_a_participant_plays_once(played):
-    require_unplayed(played, "sub-03")
-    with pytest.raises(StudyError, match=r"sub-02 has played: .* next is sub-03"):
-        require_unplayed(played, "sub-02")
-    with pytest.raises(StudyError, match="it has sub-01 to sub-04"):
-        require_unplayed(played, "sub-17")
-
-
-def test_a_session_that_was_cut_short_may_be_gone_on_with(played):
-    path = played.session_folder("sub-02") / "journal.jsonl"
-    path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:20]))
-    require_unplayed(played, "sub-02")
