@@ -26,6 +26,7 @@ GROUPS = (
     Group("states", "snapshots, checkpoints, cuts, ledger", f"{_HERE}.states:targets", 30_000),
     Group("files", "model, bundle, calibration, JSON", f"{_HERE}.texts:files", 20_000),
     Group("sections", "sections of a site file", f"{_HERE}.texts:sections", 12_000),
+    Group("pages", "what the pages of a study ask for", f"{_HERE}.pages:targets", 20_000),
     Group("studies", "protocol, journal, tables of a study", f"{_HERE}.studies:targets", 12_000),
     Group("tables", "data sets, archived bouts, recordings", f"{_HERE}.tables:targets", 8_000),
 )
@@ -54,6 +55,7 @@ NO_ENTRANCES: dict[str, str] = {
     "services.robot_io.tones.player:Player.listen": _OWN,
     "services.robot_io.tones.player:main": _OWN,
     "services.robot_io.tones.sounddevice_sink:SoundCard._listen_to": _OWN,
+    "services.study.view:": _BEHIND,
     "shared.config.toml:parse": _BEHIND,
     "shared.identification.dataset.tables:_Csv._table": _BEHIND,
     "shared.messages.wire:": _BEHIND,

@@ -27,6 +27,7 @@ READERS = frozenset({
     "csv.DictReader", "xmlrpc.client.loads", "yaml.safe_load", "struct.unpack",
     "struct.unpack_from", "onnx.load", "onnx.load_from_string", "torch.load", "zipfile.ZipFile",
     "AnyReader", "read_array", "table_of", "load", "_decode_header", "_ASKS.decode",
+    "_RESEARCHER.decode", "_PARTICIPANT.decode",
     "int.from_bytes", "np.frombuffer", "POSE.unpack", "_POINTER.unpack", "WORD.unpack_from",
     "_FRAME.unpack", "_FRAME.unpack_from", "_PREFIX.unpack_from", "kind.from_string",
     "kind.from_file", "ET.fromstring", "deserialize_ros1", "reader.deserialize",
