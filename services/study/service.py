@@ -147,7 +147,8 @@ class Study:
             waiting_for=session.waits_for,
             waiting_seconds=self._clock.now() - self._waited_at if session.waits_for else 0.0,
             counters={
-                "events": len(session.events), "heart_rate_rows": self._heart.rows,
+                "events": len(session.events), "is_over": int(session.is_over),
+                "heart_rate_rows": self._heart.rows,
                 **self._counters, **(window.counters if window is not None else {}),
             },
             last_error=session.moment.trouble or (window.last_refusal if window else ""),

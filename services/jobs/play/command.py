@@ -12,6 +12,7 @@ import threading
 import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Protocol
 
 import msgspec
 import structlog
@@ -26,7 +27,8 @@ from services.jobs.play.summary import PlayedMatch, summary_of, summary_text, wr
 from services.jobs.status import Endpoint, write_endpoint
 from services.jobs.train.processes import StopAsked, endpoint_of, wait_for_router
 from services.jobs.who import operator
-from services.supervisor import Supervisor
+from services.supervisor import ProcessSpec, Supervisor
+from shared.bus.base import Bus
 from shared.bus.zenoh import open_zenoh
 from shared.clock import SystemClock
 from shared.errors import RiposteError
@@ -87,13 +89,49 @@ def _point_latest_at(folder: Path) -> None:
             temporary.replace(link)
 
 
+class Host(Protocol):
+    """Somebody who arms, starts and ends the bouts of a match in the place of this job."""
+
+    @property
+    def title(self) -> str:
+        """Return what it is, for people."""
+        ...
+
+    @property
+    def is_over(self) -> bool:
+        """Return whether the match is to end."""
+        ...
+
+    def processes(self, made: list[ProcessSpec], endpoint: str) -> list[ProcessSpec]:
+        """Return what to start, given what a match starts."""
+        ...
+
+    def listen(self, bus: Bus) -> None:
+        """Begin to listen."""
+        ...
+
+    def tick(self, screen: Screen) -> None:
+        """Show how it goes."""
+        ...
+
+
 class Course:
     """A match from the first process to the last."""
 
     def __init__(
-        self, plan: Plan, console: Console, stop: threading.Event, *, browser: bool
-    ) -> None:
-        """Prepare; ``stop`` is set when the person at the terminal asks to stop."""
+        self, plan: Plan, console: Console, stop: threading.Event, *, browser: bool,
+        host: Host | None = None,
+    ) -> None:  # fmt: skip
+        """Prepare.
+
+        Args:
+            plan: what to play.
+            console: to draw on.
+            stop: set when the person at the terminal asks to stop.
+            browser: whether to open pages.
+            host: who leads the match; None where this job does.
+        """
+        self._host = host
         self._plan = plan
         self._console = console
         self._stop = stop
@@ -122,7 +160,10 @@ class Course:
             plan.folder,
             Endpoint(connect=endpoint, run=plan.run, certificates=plan.bus.certificates),
         )
-        supervisor = Supervisor(processes(plan, endpoint), plan.folder / "logs", self._clock)
+        specs = processes(plan, endpoint)
+        if self._host is not None:
+            specs = self._host.processes(specs, endpoint)
+        supervisor = Supervisor(specs, plan.folder / "logs", self._clock)
         try:
             for event in supervisor.start():
                 log.info("process_started", process=event.name, pid=event.pid)
@@ -144,15 +185,23 @@ class Course:
         cfg = msgspec.structs.replace(plan.bus, connect=(endpoint,))
         with contextlib.closing(open_zenoh(cfg, "play", self._clock, plan.run)) as bus:
             match = self._match = Match(self._terms(), bus, self._clock)
+            host = self._host
+            title = host.title if host is not None else ""
             with (
                 contextlib.closing(match),
-                Screen(plan, match, bus, self._clock, self._console) as screen,
+                Screen(plan, match, bus, self._clock, self._console, title) as screen,
             ):
                 self._screen = screen
+                if host is not None:
+                    host.listen(bus)
                 while not match.is_over and not self._stop.wait(TICK_SECONDS):
                     bus.wait(0.0)
                     self._watch(supervisor, match, screen)
                     match.tick()
+                    if host is not None:
+                        host.tick(screen)
+                        if host.is_over:
+                            break
                     self._open_page(screen)
                     screen.tick()
                 shut = match.shut()
@@ -167,18 +216,22 @@ class Course:
         if match.ended:
             return EXIT_UNFINISHED
         is_whole = not plan.bouts or match.finished >= plan.bouts
+        if host is not None:
+            is_whole = host.is_over
         if not is_whole:
             self._ended = "stopped by Ctrl-C"
         return 0 if is_whole else EXIT_INTERRUPTED
 
     def _terms(self) -> Terms:
         plan = self._plan
+        is_led = self._host is not None
         return Terms(
             antagonist=plan.antagonist.reference,
             protagonist=plan.protagonist.reference,
             bouts=plan.bouts,
-            arms=plan.is_armed_by_typing,
-            starts=plan.starts_bouts,
+            arms=plan.is_armed_by_typing and not is_led,
+            starts=plan.starts_bouts and not is_led,
+            ends=not is_led,
             rest=plan.play.rest,
             patience=plan.play.patience,
             operator=operator(),
@@ -203,11 +256,11 @@ class Course:
 
     def _open_page(self, screen: Screen) -> None:
         """Say where the page is, once it is there, and open it."""
-        if screen.url or not self._plan.has_page:
+        if "page" in screen.places or not self._plan.has_page:
             return
         if (url := read_page_url(self._plan.folder)) is None:
             return
-        screen.url = url
+        screen.places["page"] = url
         screen.say(f"page: {url}")
         if self._browser and has_browser():
             webbrowser.open(url)

@@ -68,6 +68,8 @@ class Terms(msgspec.Struct, frozen=True, kw_only=True):
     """Whether to arm the robot once, at the beginning."""
     starts: bool
     """Whether to start the bouts; else somebody else does."""
+    ends: bool = True
+    """Whether to abandon a bout in which the robot cannot move any more."""
     rest: float
     """Before each bout (s)."""
     patience: float
@@ -152,7 +154,8 @@ class Match:
             self._disarm(now)
         elif not self._was_armed:
             self._arm(now)
-        self._end_bout_of_a_shut_gate(now)
+        if self.terms.ends:
+            self._end_bout_of_a_shut_gate(now)
         if self.terms.starts and not self.is_over:
             self._start(now)
             self._watch_patience(now)

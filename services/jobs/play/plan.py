@@ -171,7 +171,8 @@ def plan_of(found: argparse.Namespace) -> Plan:
     )
 
 
-def _override(key: str, value: object) -> str:
+def override(key: str, value: object) -> str:
+    """Return a setting as it stands on a command line."""
     return f"{key}={tomli_w.dumps({'value': value}).partition('=')[2].strip()}"
 
 
@@ -182,7 +183,7 @@ def _flags(found: argparse.Namespace) -> list[str]:
         "play.bouts": found.bouts,
         "page.port": found.port,
     }
-    return [_override(key, value) for key, value in given.items() if value is not None]
+    return [override(key, value) for key, value in given.items() if value is not None]
 
 
 def _folder(out: Path | None) -> Path:
@@ -205,7 +206,7 @@ def _robot(site: Path | None, words: Sequence[str]) -> tuple[str, str]:
     tracker = ""
     with contextlib.suppress(ConfigError):  # a link that does not go with the default tracker
         tracker = load_section(site, "robot_io", RobotIoConfig, words).tracker
-    words = [*words, _override("robot_io.tracker", "mouse"), _override("robot_io.replay", "")]
+    words = [*words, override("robot_io.tracker", "mouse"), override("robot_io.replay", "")]
     return load_section(site, "robot_io", RobotIoConfig, words).link, tracker
 
 
@@ -292,4 +293,4 @@ def _assignments(antagonist: Seat, protagonist: Seat, page: PageConfig) -> list[
         values["robot_io.replay"] = ""
     if not antagonist.is_person:
         values["policy.antagonist"] = antagonist.player
-    return [_override(key, value) for key, value in values.items()]
+    return [override(key, value) for key, value in values.items()]

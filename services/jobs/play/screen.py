@@ -31,13 +31,17 @@ COLOURS = {
 class Screen:
     """Shows a match; use it as a context."""
 
-    def __init__(self, plan: Plan, match: Match, bus: Bus, clock: Clock, console: Console) -> None:
+    def __init__(
+        self, plan: Plan, match: Match, bus: Bus, clock: Clock, console: Console, title: str = ""
+    ) -> None:
         """Listen to robot_io's status; draw on ``console``."""
         self.status: ServiceStatus | None = None
         """What robot_io said last."""
-        self.url = ""
-        """Of the page, once it can be opened."""
-        self._plan = plan
+        self.places: dict[str, str] = {}
+        """Addresses that can be opened, by what is there."""
+        self.notes: tuple[str, ...] = ()
+        """Lines about what else goes on."""
+        self._title = title or f"{plan.antagonist.label} v {plan.protagonist.label}"
         self._match = match
         self._clock = clock
         self._console = console
@@ -80,7 +84,7 @@ class Screen:
             self._live.update(self._panel(), refresh=True)
         else:
             self._due_at = now + LINE_PERIOD
-            text = line(self._match)
+            text = ", ".join((*self.notes, line(self._match)))
             if text != self._shown:
                 self._print(text)
             self._shown = text
@@ -96,8 +100,9 @@ class Screen:
         self._console.print(f"{elapsed} {text}", soft_wrap=True, markup=False, highlight=False)
 
     def _panel(self) -> RenderableType:
-        plan, match = self._plan, self._match
+        match = self._match
         parts: list[RenderableType] = [bout_row(match)]
+        parts += [Text(note) for note in self.notes]
         if match.gate is not None:
             mode = match.gate.mode
             parts.append(
@@ -110,13 +115,11 @@ class Screen:
         for at, text in self._events:
             elapsed = clock_text(at - self._began_at)
             parts.append(Text.assemble((f"{elapsed:>6}  ", "dim"), text))
-        if self.url:
-            parts.append(Text.assemble(("page  ", "bold"), (self.url, "underline cyan")))
+        for name, url in self.places.items():
+            parts.append(Text.assemble((f"{name}  ", "bold"), (url, "underline cyan")))
         return Panel(
             Group(*parts),
-            title=Text.assemble(
-                ("riposte ", "bold"), f"{plan.antagonist.label} v {plan.protagonist.label}"
-            ),
+            title=Text.assemble(("riposte ", "bold"), self._title),
             title_align="left",
             subtitle="Ctrl-C ends",
             subtitle_align="right",

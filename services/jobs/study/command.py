@@ -19,8 +19,10 @@ SUBCOMMANDS = (
     Subcommand("new", "make a study's folder from a protocol"),
     Subcommand("check", "check a protocol, or a study with all its data"),
     Subcommand("allocate", "draw who meets the conditions in which order"),
+    Subcommand("run", "run one participant's session, from the welcome to the debrief"),
     Subcommand("withdraw", "delete everything of a participant"),
     Subcommand("export", "write the tables as CSV, blinded unless asked otherwise"),
+    Subcommand("analyse", "every statistic of a study: a report, JSON and CSV tables"),
 )
 EXIT_BAD_INPUT = 2
 

@@ -107,7 +107,7 @@ def test_a_terminal_shows_phase_score_gate_and_lateness(plan: Plan):
     console = Console(file=out, width=120, force_terminal=True, color_system=None)
     with Screen(plan, stage.match, stage.play, stage.clock, console) as screen:
         stage.robot.publish(STATUS, STATUS_NOW, role="robot-io", name="robot-io-0")
-        screen.url = "http://127.0.0.1:8765"
+        screen.places["page"] = "http://127.0.0.1:8765"
         stage.tick(0.3)
         screen.say("policy-protagonist died (killed by SIGKILL)")
         screen.tick()
