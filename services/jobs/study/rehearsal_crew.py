@@ -62,12 +62,12 @@ class Crew:
         self._processes = processes
         self._names = [participant_name(number) for number in range(1, people + 1)]
         self._steps = {name: study.steps_of(name) for name in self._names}
-        self._waiting = [k for k, name in enumerate(self._names, 1) if not self._is_over(name)]
         self._running: dict[int, subprocess.Popen[bytes]] = {}
         self._said: dict[int, IO[bytes]] = {}
         """What each process writes to its standard error."""
         self._read: dict[str, tuple[int, list[dict[str, Any]]]] = {}
         """Size and lines of each journal, as read last."""
+        self._waiting = [k for k, name in enumerate(self._names, 1) if not self._is_over(name)]
         self._at_first = 0.0
         self._began_at = 0.0
         self.cpu_seconds = 0.0

@@ -17,7 +17,7 @@ from shared.study.people.heart import WALKING, Heart, effort_of
 from shared.study.people.population import Traits
 from shared.study.people.skill import character_at
 
-SEARCH_SECONDS: Final = 30.0
+SEARCH_SECONDS: Final = 20.0
 """Of an exploration; then the target is found, and the rest is spent standing (s)."""
 LONGEST_STEP: Final = 0.1
 """What is longer is a leap of the clock, in which the hand is not moved (s)."""
