@@ -41,7 +41,8 @@ class Components:
     games: Floats
     """float64[k], game numbers of a section."""
     residuals: Floats
-    """float64[m], points: games about their person's line, as wide as the games' own scatter."""
+    """float64[2, m], points: games of each condition about their person's line, as wide as the
+    games' own scatter."""
     slope_spread: float
     """Over people, of the difference of slopes (points a game), without the games' scatter."""
 
@@ -54,7 +55,7 @@ class Components:
     @property
     def spread(self) -> float:
         """Return the standard deviation over people of a measured difference of slopes."""
-        of_games = 2.0 * float(self.residuals.var()) * float((self.weights**2).sum())
+        of_games = float(self.residuals.var(axis=1).sum()) * float((self.weights**2).sum())
         return float(np.sqrt(self.slope_spread**2 + of_games))
 
 
@@ -74,7 +75,7 @@ class Planned(msgspec.Struct, frozen=True, kw_only=True):
     slope_spread: float
     """Between people (points a game)."""
     residual_sd: float
-    """Of a game (points)."""
+    """Of a game, root of the mean over both conditions (points)."""
     people: int
     """Of the study that this is taken from."""
     curve: tuple[Power, ...]
@@ -103,10 +104,10 @@ def components_of(games: Floats, first: Floats, second: Floats) -> Components:
             f"{n} people with {k} games in both conditions are too few to say how people differ: "
             f"at least {FEWEST_PEOPLE} with 3 games are needed"
         )
-    residuals = np.concatenate([_about_lines(games, first), _about_lines(games, second)])
-    residuals = residuals.ravel() * np.sqrt(k / (k - 2.0))
+    lines = np.stack([_about_lines(games, first).ravel(), _about_lines(games, second).ravel()])
+    residuals = lines * np.sqrt(k / (k - 2.0))
     difference = person_slopes(games, first) - person_slopes(games, second)
-    of_games = 2.0 * residuals.var() / ((games - games.mean()) ** 2).sum()
+    of_games = residuals.var(axis=1).sum() / ((games - games.mean()) ** 2).sum()
     between = max(float(difference.var(ddof=1) - of_games), 0.0)
     return Components(games, residuals, float(np.sqrt(between)))
 
@@ -128,9 +129,12 @@ def found(
     count, left = 0, draws
     while left > 0:
         size = min(left, max(_CHUNK // (2 * people * k), 1))
-        noise = rng.choice(components.residuals, (size, people, 2, k)) @ components.weights
+        one, two = (
+            rng.choice(games, (size, people, k)) @ components.weights
+            for games in components.residuals
+        )
         own = components.slope_spread * rng.standard_normal((size, people))
-        difference = effect + own + noise[..., 0] - noise[..., 1]
+        difference = effect + own + one - two
         error = difference.std(axis=1, ddof=1) / np.sqrt(people)
         t = difference.mean(axis=1) / np.maximum(error, 1e-12)
         count += int(np.count_nonzero(np.abs(t) > limit))
@@ -174,7 +178,7 @@ def plan(
     return Planned(
         effect=effect,
         slope_spread=components.slope_spread,
-        residual_sd=float(components.residuals.std()),
+        residual_sd=float(np.sqrt(components.residuals.var(axis=1).mean())),
         people=n,
         curve=curve,
         needed=wanted[0] if wanted else None,
