@@ -165,6 +165,8 @@ def _asked(
 def _instrument(keys: tuple[Key, ...], instrument: Instrument) -> Iterator[Problem]:
     items = instrument.item
     ids = [item.id for item in items]
+    if instrument.is_ranking and instrument.is_paged:
+        yield Problem((*keys, "is_paged"), "a ranking stands on one page")
     for index, item in enumerate(items):
         if item.id in ids[:index]:
             yield Problem((*keys, "item", index, "id"), f"{item.id!r} stands here twice")
