@@ -11,10 +11,9 @@ import warnings
 from typing import Any
 
 import numpy as np
-import statsmodels.api as sm
 from numpy.typing import NDArray
 from scipy import stats
-from statsmodels.regression.mixed_linear_model import MixedLMParams
+from statsmodels.regression.mixed_linear_model import MixedLM, MixedLMParams
 from statsmodels.tools.sm_exceptions import ConvergenceWarning
 
 from shared.study.analysis.finding import Estimate, Finding, missing_text, not_done
@@ -87,7 +86,7 @@ def mixed_slopes(games: Floats, first: Floats, second: Floats, question: str) ->
 def _fit(y: Floats, design: Any, terms: list[int], person: NDArray[np.intp]) -> Any:
     """Return the fit where it converged and has finite errors, else None."""
     fixed: Any = np.ones(design.shape[1])
-    model = sm.MixedLM(y, design, groups=person, exog_re=design[:, terms])
+    model = MixedLM(y, design, groups=person, exog_re=design[:, terms])
     free = MixedLMParams.from_components(fixed, np.eye(len(terms)))  # no covariances
     with warnings.catch_warnings():
         # Each of them says what `converged` and the errors say again.

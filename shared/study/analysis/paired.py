@@ -4,7 +4,7 @@ A paired test is a one-sample test of the differences, and is done as one.
 """
 
 # pyright: basic
-# (scipy's and statsmodels' types are partial)
+# (scipy's types are partial)
 
 import dataclasses
 import itertools
@@ -16,7 +16,6 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
-from statsmodels.stats.multitest import multipletests
 
 from shared.study.analysis.finding import (
     Check,
@@ -166,10 +165,11 @@ def holm(findings: Sequence[Finding]) -> tuple[Finding, ...]:
     done = [k for k, finding in enumerate(findings) if finding.p is not None]
     if len(done) < 2:
         return tuple(findings)
-    adjusted: Any = multipletests([findings[k].p for k in done], method="holm")[1]
     made = list(findings)
-    for k, p in zip(done, adjusted, strict=True):
-        made[k] = msgspec.structs.replace(made[k], p_adjusted=float(p), family=len(done))
+    least = 0.0
+    for rank, k in enumerate(sorted(done, key=lambda k: findings[k].p or 0.0)):
+        least = max(least, min(1.0, (len(done) - rank) * (findings[k].p or 0.0)))
+        made[k] = msgspec.structs.replace(made[k], p_adjusted=least, family=len(done))
     return tuple(made)
 
 

@@ -12,10 +12,11 @@ from typing import Any
 
 import msgspec
 import numpy as np
-import statsmodels.api as sm
 from numpy.typing import NDArray
 from scipy import stats
+from statsmodels.regression.linear_model import OLS
 from statsmodels.stats.diagnostic import het_breuschpagan
+from statsmodels.tools.tools import add_constant
 
 from shared.study.analysis.correlation import spearman
 from shared.study.analysis.finding import Check, Estimate, Finding, check, missing_text, not_done
@@ -155,7 +156,7 @@ def _clustered(x: Floats, y: Floats, person: NDArray[np.intp], question: str) ->
     people = len(np.unique(person))
     if people < FEWEST:
         return not_done(question, test, people, f"{people} people, it needs {FEWEST}")
-    fit: Any = sm.OLS(y, sm.add_constant(x)).fit(
+    fit: Any = OLS(y, add_constant(x)).fit(
         cov_type="cluster", cov_kwds={"groups": person, "df_correction": True}, use_t=True
     )
     low, high = fit.conf_int(2.0 * TAIL)[1]
@@ -177,5 +178,5 @@ def _clustered(x: Floats, y: Floats, person: NDArray[np.intp], question: str) ->
 def _equal_variance(x: Floats, residuals: Floats) -> tuple[Check, ...]:
     if np.ptp(residuals) == 0.0:
         return ()
-    statistic, p, _, _ = het_breuschpagan(residuals, sm.add_constant(x))
+    statistic, p, _, _ = het_breuschpagan(residuals, add_constant(x))
     return (check("variance is equal along the line", "Breusch-Pagan", float(statistic), float(p)),)
