@@ -1,6 +1,6 @@
 """What happens in a session: the kinds of events that its journal holds, one a line."""
 
-from typing import Annotated, Final, Literal
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -13,7 +13,6 @@ Number = Annotated[float, msgspec.Meta(ge=-1e15, le=1e15)]
 Outcome = Literal["finished", "void", "repeat"]
 """``finished``: it counts. ``void``: it does not, and is not played again. ``repeat``: it does not,
 and is played again as the next attempt."""
-END_OUTCOMES: Final[tuple[Outcome, ...]] = ("finished", "void", "repeat")
 
 
 class Answer(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

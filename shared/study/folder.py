@@ -21,12 +21,13 @@ from typing import Annotated, Final, Literal
 import msgspec
 
 from shared.clock import Clock
+from shared.config.located import read_toml
 from shared.errors import ConfigError, StudyError
 from shared.runtime.files import atomic_write
 from shared.study.allocation import Assignment
 from shared.study.instants import text_of
 from shared.study.protocol import Name, Protocol
-from shared.study.protocol_file import read_protocol, read_toml
+from shared.study.protocol_file import PATTERNS, read_protocol
 from shared.study.rows import SCHEMA, ParticipantRow
 from shared.study.steps import Step, steps_of
 from shared.study.tsv import read_table, write_table
@@ -262,7 +263,7 @@ def read_key(folder: Path) -> Key | None:
         ConfigError: it is no good; names the line.
     """
     data = read_if_there(folder / KEY)
-    return None if data is None else read_toml(data, str(folder / KEY), Key)
+    return None if data is None else read_toml(data, str(folder / KEY), Key, PATTERNS)
 
 
 def note_change(folder: Path, text: str, clock: Clock) -> None:

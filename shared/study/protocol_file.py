@@ -1,16 +1,12 @@
 """Reads a protocol from its TOML file; what is wrong is named with file, line and field."""
 
-import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Final, NamedTuple, TypeVar, get_args
+from typing import Final
 
-import msgspec
-
-from shared.config import toml
-from shared.config.location import line_of
+from shared.config.located import Key, Problem, read_toml, sentence
 from shared.config.site import nearest
 from shared.errors import ConfigError
 from shared.study.protocol import ITEM_ID, LANGUAGE, NAME, ONE_LINE, Instrument, Protocol
@@ -18,29 +14,13 @@ from shared.study.protocol import ITEM_ID, LANGUAGE, NAME, ONE_LINE, Instrument,
 SHIPPED: Final = ("study-one", "study-two", "template")
 """Names of the protocols that come with the program."""
 
-Key = str | int
-S = TypeVar("S", bound=msgspec.Struct)
-
-_UNKNOWN_FIELD = re.compile(r"Object contains unknown field `(?P<field>[^`]*)`")
-_MISSING_FIELD = re.compile(r"Object missing required field `(?P<field>[^`]*)`")
-_AT = re.compile(r" - at `\$(?P<path>[^`]*)`\Z")
-_PATTERN = re.compile(r"Expected `str` matching regex '(?P<pattern>.*)'\Z")
-_PATTERNS: Final = {
+PATTERNS: Final = {
     NAME: "up to 40 small letters, digits and hyphens",
     ITEM_ID: "up to 40 letters, digits, hyphens and underscores",
     ONE_LINE: "one line without tabs",
     LANGUAGE: "a language such as en or de-CH",
 }
-_PART = re.compile(r"\.?(?P<name>[^.\[\]]+)|\[(?P<index>\d+|\.\.\.)\]")
-
-
-class Problem(NamedTuple):
-    """What is wrong with a value that is of the right type."""
-
-    keys: tuple[Key, ...]
-    """Where: ``("section", 2, "instruments")``."""
-    text: str
-    """What it is, and what was expected."""
+"""What the patterns of a protocol and of a key ask for, in words."""
 
 
 def load_protocol(path: Path) -> Protocol:
@@ -67,9 +47,9 @@ def read_protocol(data: bytes, name: str) -> Protocol:
     Raises:
         ConfigError: as ``load_protocol``.
     """
-    protocol = read_toml(data, name, Protocol)
+    protocol = read_toml(data, name, Protocol, PATTERNS)
     for problem in problems_of(protocol):
-        raise ConfigError(_sentence(name, data.decode(), problem))
+        raise ConfigError(sentence(name, data.decode(), problem))
     return protocol
 
 
@@ -82,25 +62,6 @@ def shipped_protocol(name: str) -> Path:
     if name not in SHIPPED:
         raise ConfigError(f"there is no protocol {name!r}; {nearest(name, SHIPPED)}")
     return Path(str(resources.files("shared.study") / "protocols" / f"{name}.toml"))
-
-
-def read_toml(data: bytes, name: str, type: type[S]) -> S:
-    """Return the struct that a TOML text holds.
-
-    Args:
-        data: the text.
-        name: of the file, for messages.
-        type: the struct.
-
-    Raises:
-        ConfigError: it is not TOML, or does not fit: says file, line and field.
-    """
-    try:
-        return toml.decode(data, type)
-    except msgspec.ValidationError as error:
-        raise ConfigError(_sentence(name, data.decode(), _problem(error, type))) from error
-    except ValueError as error:
-        raise ConfigError(f"{name}: not TOML: {error}") from error
 
 
 def problems_of(protocol: Protocol) -> Iterator[Problem]:
@@ -188,90 +149,3 @@ def _doubled(table: str, names: Sequence[str]) -> Iterator[Problem]:
         if count > 1:
             second = [index for index, each in enumerate(names) if each == name][1]
             yield Problem((table, second, "name"), f"{name!r} stands here twice")
-
-
-def _sentence(name: str, text: str, problem: Problem) -> str:
-    line = line_of(text, problem.keys)
-    where = f"{name}:{line}" if line else name
-    field = _dotted(problem.keys)
-    return f"{where}: {field}: {problem.text}" if field else f"{where}: {problem.text}"
-
-
-def _dotted(keys: Iterable[Key]) -> str:
-    """Return keys as people write them; entries of an array count from 1."""
-    made = ""
-    for key in keys:
-        made += f"[{key + 1}]" if isinstance(key, int) else f"{'.' if made else ''}{key}"
-    return made
-
-
-def _problem(error: msgspec.ValidationError, type: type[msgspec.Struct]) -> Problem:
-    message = str(error)
-    keys: tuple[Key, ...] = ()
-    if at := _AT.search(message):
-        keys = tuple(_parts(at["path"]))
-        message = message[: at.start()]
-    if unknown := _UNKNOWN_FIELD.search(message):
-        field = unknown["field"]
-        return Problem((*keys, field), f"unknown field; {nearest(field, _fields(type, keys))}")
-    if missing := _MISSING_FIELD.search(message):
-        return Problem(keys, f"{missing['field']} is missing")
-    if message.startswith("Invalid enum value") and (known := _literals(type, keys)):
-        return Problem(keys, f"{message[:1].lower()}{message[1:]}; expected {known}")
-    if pattern := _PATTERN.search(message):
-        words = _PATTERNS.get(pattern["pattern"], pattern["pattern"])
-        return Problem(keys, f"expected {words}")
-    first = re.match(r"\w+", message)
-    if first and first.group() in _fields(type, keys):  # said by __post_init__
-        return Problem((*keys, first.group()), message)
-    return Problem(keys, message[:1].lower() + message[1:])
-
-
-def _parts(path: str) -> Iterator[Key]:
-    for part in _PART.finditer(path):
-        if part["name"] is not None:
-            yield part["name"]
-        elif part["index"] != "...":
-            yield int(part["index"])
-
-
-def _literals(type: object, keys: Sequence[Key]) -> str:
-    """Return the words that the field at ``keys`` may be, as a list for people."""
-    names = [key for key in keys if isinstance(key, str)]
-    found = _struct_at(type, names[:-1])
-    if found is None or not names:
-        return ""
-    fields = msgspec.structs.fields(found)
-    annotation = next((f.type for f in fields if f.encode_name == names[-1]), None)
-    return ", ".join(repr(word) for word in _words_in(annotation))
-
-
-def _words_in(annotation: object) -> Iterator[str]:
-    for inner in get_args(annotation):
-        if isinstance(inner, str):
-            yield inner
-        else:
-            yield from _words_in(inner)
-
-
-def _fields(type: object, keys: Sequence[Key]) -> list[str]:
-    """Return the names of the fields of the struct that stands at ``keys`` in another one."""
-    found = _struct_at(type, keys)
-    return [] if found is None else [f.encode_name for f in msgspec.structs.fields(found)]
-
-
-def _struct_at(annotation: object, keys: Sequence[Key]) -> type[msgspec.Struct] | None:
-    found = _struct_in(annotation)  # types are values here
-    for key in keys:
-        if found is not None and isinstance(key, str):
-            fields = msgspec.structs.fields(found)
-            found = next((_struct_in(f.type) for f in fields if f.encode_name == key), None)
-    return found
-
-
-def _struct_in(annotation: object) -> type[msgspec.Struct] | None:
-    """Return the struct in ``tuple[S, ...]``, ``S | None`` and the like."""
-    if isinstance(annotation, type) and issubclass(annotation, msgspec.Struct):
-        return annotation
-    found = (_struct_in(inner) for inner in get_args(annotation))
-    return next((each for each in found if each is not None), None)

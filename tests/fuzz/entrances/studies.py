@@ -42,7 +42,7 @@ def _protocol() -> Target:
         samples=tuple(shipped_protocol(name).read_bytes() for name in SHIPPED),
         mutate=formats.toml_text,
         refusals=(ConfigError,),
-        covers=("shared.study.protocol_file:read_toml",),
+        covers=("shared.config.located:read_toml",),
     )
 
 
