@@ -10,9 +10,10 @@ const STEERS = ["begin", "pause", "resume"];
 const GATE = ["arm", "disarm", "reset"];
 const WITH_REASON = ["next", "void", "repeat", "abort"];
 const OF_GAMES = ["void", "repeat"];
+const STOP = "To stop the robot use its emergency stop, or riposte robot disarm.";
 const LOST = {
-  lost: "NO CONNECTION TO THE STUDY. What you see is old; trying again …",
-  silent: "THE STUDY DOES NOT RESPOND. What you see is old; see its terminal.",
+  lost: `NO CONNECTION TO THE STUDY. What you see is old; trying again … ${STOP}`,
+  silent: `THE STUDY DOES NOT RESPOND. What you see is old; see its terminal. ${STOP}`,
 };
 const COURSES = { new: "not begun", running: "running", paused: "paused", aborted: "aborted", ended: "ended" };
 const SCREENS = {
