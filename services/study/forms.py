@@ -38,10 +38,10 @@ def lacks_of(items: Sequence[Item], answers: Sequence[Answer]) -> list[str]:
     if len(given) < len(answers):
         lacks.append("a question is answered twice")
     for item in items:
-        if (answer := given.get(item.id)) is None or is_empty(item, answer):
-            if item.is_required:
-                lacks.append(f"{item.id} has no answer")
-        else:
+        answer = given.get(item.id)
+        if item.is_required and (answer is None or is_empty(item, answer)):
+            lacks.append(f"{item.id} has no answer")
+        if answer is not None:
             lacks += _wrong(item, answer)
     return lacks
 
@@ -72,7 +72,7 @@ def _wrong(item: Item, answer: Answer) -> list[str]:
         lacks.append(f"{item.id} has an option twice")
     if len(answer.choices) > 1 and not item.is_several:
         lacks.append(f"{item.id} has {len(answer.choices)} options, expected one")
-    if len(answer.ranks) != ranked or any(rank > ranked for rank in answer.ranks):
+    if len(answer.ranks) not in (0, ranked) or any(rank > ranked for rank in answer.ranks):
         lacks.append(
             f"{item.id} has ranks {list(answer.ranks)}, expected {ranked} of 1 to {ranked}"
         )

@@ -55,6 +55,11 @@ def test_an_answer_that_does_not_fit_is_named(answer: Answer, lack: str):
     assert lacks_of(ITEMS, [*kept, answer]) == [lack]
 
 
+def test_an_empty_answer_holds_nothing_else():
+    kept = [answer for answer in WHOLE if answer.item != "why"]
+    assert lacks_of(ITEMS, [*kept, Answer(item="why", value=3)]) == ["why is 3, expected at most 0"]
+
+
 def test_a_question_is_answered_once():
     assert lacks_of(ITEMS, [*WHOLE, WHOLE[0]]) == ["a question is answered twice"]
 
