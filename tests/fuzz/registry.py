@@ -46,6 +46,7 @@ NO_ENTRANCES: dict[str, str] = {
     "services.jobs.chaos.tail:_event": _CHAOS,
     "services.jobs.tournament.files:write_results": _OWN,
     "services.jobs.tournament.ratings:bouts_of": "makes the table from the ledger; reads no bytes",
+    "services.jobs.study.rehearsal_crew:Crew._lines": "a journal; `journal.jsonl` is fuzzed",
     "services.league.leases:evaluation_seed": "the digest of a seed",
     "services.league.ledger:Ledger._open": "the league's own file, locked; readers are fuzzed",
     "services.league.ledger:_connect_read_only": _BEHIND,

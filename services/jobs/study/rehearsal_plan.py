@@ -9,6 +9,7 @@ import tomli_w
 from services.jobs.study.players import seats_of
 from services.robot_io.config import RobotIoConfig, SafetyConfig
 from services.study.config import StudyConfig
+from shared.config import toml
 from shared.config.site import load_section, raw_sections
 from shared.errors import ConfigError
 from shared.game.rules import RuleBook
@@ -101,10 +102,10 @@ def read_plan(folder: Path) -> tuple[RehearsalPlan, bytes]:
     path = folder / FILE
     try:
         data = path.read_bytes()
-        return msgspec.toml.decode(data, type=RehearsalPlan), data
+        return toml.decode(data, RehearsalPlan), data
     except OSError as error:
         raise ConfigError(f"cannot read {path}: {error.strerror or error}") from error
-    except (ValueError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise ConfigError(f"{path} is no rehearsal: {error}") from error
 
 

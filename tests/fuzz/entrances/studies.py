@@ -8,6 +8,8 @@ from random import Random
 
 import msgspec
 
+from services.jobs.study import hosting, rehearsal_plan
+from services.jobs.study.rehearsal_plan import make_plan, read_plan, write_plan
 from shared.errors import ConfigError, StudyError
 from shared.study import recorded
 from shared.study.events import Event
@@ -32,7 +34,10 @@ def targets(folder: Path) -> list[Target]:
     study = study_in(place) if not place.exists() else open_study(place)
     if not study.session_folder("sub-01").exists():
         play(study, "sub-01", is_repeated="s1-g02")
-    return [_protocol(), _journal(study), *_texts(study, folder), *_tables(study)]
+    return [
+        _protocol(), _journal(study), *_texts(study, folder), *_tables(study),
+        _rehearsal(study, folder / "rehearsal"), _place(folder / "place"),
+    ]  # fmt: skip
 
 
 def _protocol() -> Target:
@@ -160,3 +165,29 @@ def _one_cell(random: Random, data: bytes) -> bytes:
     if random.random() < 0.2:
         lines.insert(random.randrange(len(lines)), random.choice(lines))
     return b"\n".join(b"\t".join(row) for row in lines)
+
+
+def _rehearsal(study: Study, folder: Path) -> Target:
+    folder.mkdir(parents=True, exist_ok=True)
+    write_plan(folder, make_plan(study.protocol, None, (), 1, is_archived=True))
+    path = folder / rehearsal_plan.FILE
+    return Target(
+        name=f"studies/{path.name}",
+        read=from_file(path, functools.partial(read_plan, folder)),
+        samples=(path.read_bytes(),),
+        mutate=formats.toml_text,
+        refusals=(ConfigError,),
+        covers=("services.jobs.study.rehearsal_plan:read_plan",),
+    )
+
+
+def _place(folder: Path) -> Target:
+    place = {"researcher": "http://127.0.0.1:1/", "participant": "http://127.0.0.1:1/", "pid": 1}
+    return Target(
+        name=f"studies/{hosting.FILE}",
+        read=from_file(folder / hosting.FILE, functools.partial(hosting.read_place, folder)),
+        samples=(json.dumps(place).encode(),),
+        mutate=formats.json_text,
+        refusals=(),
+        covers=("services.jobs.study.hosting:read_place",),
+    )
