@@ -22,7 +22,9 @@ SUBCOMMANDS = (
     Subcommand("run", "run one participant's session, from the welcome to the debrief"),
     Subcommand("withdraw", "delete everything of a participant"),
     Subcommand("export", "write the tables as CSV, blinded unless asked otherwise"),
+    Subcommand("simulate", "rehearse a whole study with simulated people, and analyse it"),
     Subcommand("analyse", "every statistic of a study: a report, JSON and CSV tables"),
+    Subcommand("power", "how many people a difference of learning needs"),
 )
 EXIT_BAD_INPUT = 2
 

@@ -28,7 +28,8 @@ def character_at(body: float, reading: float) -> Character:
     """
 
     def between(name: str, start: float, end: float) -> float:
-        return start + (reading if name in READING else body) * (end - start)
+        share = reading if name in READING else body
+        return (1.0 - share) * start + share * end
 
     numbers = {
         name: between(name, getattr(BEGINNER, name), getattr(MASTER, name))
