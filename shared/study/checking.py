@@ -1,5 +1,6 @@
 """What a researcher should know before a study begins, and of the data that are there."""
 
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
@@ -23,6 +24,9 @@ from shared.study.tsv import encode_table, read_table
 
 PLACEHOLDER: Final = "REPLACE THIS TEXT"
 """What the consent of a shipped protocol begins with."""
+BYTES_PER_SECOND: Final = 250_000
+"""Of a game: its archive and its part of recording.rrd (docs/recordings.md, "What it costs")."""
+GIB: Final = 1 << 30
 
 
 class Remark(NamedTuple):
@@ -68,6 +72,7 @@ def study_remarks(study: Study) -> Iterator[Remark]:
     for path in sorted(study.folder.glob(".withdrawn-*")):
         name = path.name.removeprefix(".withdrawn-")
         yield Remark("error", f"a withdrawal was interrupted: say it again, --participant {name}")
+    yield from _room(study)
     sessions = study.sessions()
     for participant, number, folder in sessions:
         try:
@@ -77,6 +82,21 @@ def study_remarks(study: Study) -> Iterator[Remark]:
     if study.assignments:
         yield Remark(
             "ok", f"{len(sessions)} sessions of {len(study.assignments)} participants are there"
+        )
+
+
+def _room(study: Study) -> Iterator[Remark]:
+    """Yield how much room the participants who have not played need on the disk."""
+    played = {participant for participant, _, _ in study.sessions()}
+    people = [each for each in study.assignments if each.participant not in played]
+    seconds = sum(section.games for section in study.protocol.section) * study.protocol.game.seconds
+    needed = len(people) * seconds * BYTES_PER_SECOND
+    free = shutil.disk_usage(study.folder).free
+    if free < needed:
+        yield Remark(
+            "note",
+            f"{len(people)} people who have not played need about {needed / GIB:.1f} GiB, and "
+            f"{free / GIB:.1f} GiB are free: free some, or put the study elsewhere",
         )
 
 

@@ -7,6 +7,7 @@ import pytest
 from shared.clock import ManualClock
 from shared.errors import RiposteError
 from shared.runtime.files import atomic_write
+from shared.study.checking import study_remarks
 from shared.study.events import Noted, SessionBegan
 from shared.study.folder import open_study
 from shared.study.journal import Journal, read_journal
@@ -91,3 +92,11 @@ def test_who_withdraws_is_deleted_from_a_full_disk(tmp_path):
         assert [each.participant for each in open_study(study.folder).assignments] == [
             "sub-02", "sub-03", "sub-04",
         ]  # fmt: skip
+
+
+def test_a_disk_that_will_not_hold_the_study_is_noticed_before_it_begins(tmp_path):
+    with small_disk(tmp_path, 1) as disk:
+        study = study_in(disk / "s", people=4)
+        notes = [remark.text for remark in study_remarks(study) if remark.level == "note"]
+        # 4 people, 9 games of 20 s each, 0.25 MB/s.
+        assert [note for note in notes if note.startswith("4 people who have not played need")]
