@@ -62,5 +62,6 @@ export function showDevices({ tracker, services }) {
     ["tracker", tracker !== null && tracker.is_tracked, tracker === null ? "not heard yet" : lost || "sees the bat"],
     ...services.map((service) => [service.name, service.is_alive, service.is_alive ? service.state : "not there"]),
   ];
-  fill($("services"), () => rows.map(([name, isGood, state]) => make("li", { class: isGood ? "" : "bad" }, name, make("small", { textContent: state }))), rows);
+  fill($("services"), () => rows.map(([name, isGood, state]) => make("li", { class: isGood ? "" : "bad", title: `${name}: ${state}` },
+    make("span", { textContent: name }), make("small", { textContent: state }))), rows);
 }

@@ -9,7 +9,7 @@ import { showDevices, showGate, showHeart } from "./monitors.js";
 const STEERS = ["begin", "pause", "resume"];
 const GATE = ["arm", "disarm", "reset"];
 const WITH_REASON = ["next", "void", "repeat", "abort"];
-const OF_GAMES = ["void", "repeat"];
+const SAID_MS = 15000;
 const STOP = "To stop the robot use its emergency stop, or riposte robot disarm.";
 const LOST = {
   lost: `NO CONNECTION TO THE STUDY. What you see is old; trying again … ${STOP}`,
@@ -37,9 +37,20 @@ const link = new Link("researcher", {
   state: () => followLink(),
 });
 
+/** Say what came of a click, for a while. */
 function said(text, kind) {
   put($("said"), text);
   $("said").className = kind;
+  clearTimeout(page.timer);
+  page.timer = setTimeout(() => put($("said"), ""), SAID_MS);
+}
+
+/** Return whether a button makes sense in what is shown, beyond what the runner would accept. */
+function makesSense(action, view) {
+  if (action === "arm") return view.gate.mode === "disarmed";
+  if (action === "reset") return view.gate.mode === "tripped";
+  if (action === "void" || action === "repeat") return ["running", "paused"].includes(view.bout?.phase);
+  return true;
 }
 
 function followLink() {
@@ -71,9 +82,8 @@ function show(view) {
   put($("screen"), (SCREENS[view.screen] ?? view.screen) + (view.is_participant_here ? "" : " — BUT NO PARTICIPANT'S PAGE IS OPEN"));
   $("screen").className = view.is_participant_here ? "" : "bad";
   put($("begin"), view.course === "new" ? "Begin the session" : "Begin this step");
-  const isPlaying = ["running", "paused"].includes(view.bout?.phase);
   for (const action of [...STEERS, ...GATE, ...WITH_REASON]) {
-    const may = view.may.includes(action) && (isPlaying || !OF_GAMES.includes(action));
+    const may = view.may.includes(action) && makesSense(action, view);
     $(action).disabled = !may;
     $(action).hidden = !may && action !== "abort" && !GATE.includes(action);
   }

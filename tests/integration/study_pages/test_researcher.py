@@ -58,11 +58,19 @@ def test_what_is_wrong_is_loud(visit: Visit, runner: Runner):
 def test_only_what_may_be_done_can_be_clicked(visit: Visit, runner: Runner):
     steers = ("begin", "next", "pause", "resume", "void", "repeat", "abort")
     gate = ("arm", "disarm", "reset")
-    for may in (("pause", "disarm", "abort", "void"), ("begin", "arm", "next"), ("resume",), ()):
-        runner.change(may=may)
-        visit.until(f"study.view().may.join() === '{','.join(may)}'")
-        on = {action for action in (*steers, *gate) if visit.is_on(f"#{action}")}
-        assert on == set(may)
+    for mode, may, shown in (
+        (
+            "armed",
+            {"pause", "disarm", "abort", "void", "arm"},
+            {"pause", "disarm", "abort", "void"},
+        ),
+        ("disarmed", {"begin", "arm", "next", "reset"}, {"begin", "arm", "next"}),
+        ("tripped", {"resume", "arm", "reset"}, {"resume", "reset"}),
+        ("holding", set[str](), set[str]()),
+    ):
+        runner.change(may=tuple(may), gate=GateView(mode=mode))
+        visit.until(f"study.view().gate.mode === '{mode}'")
+        assert {action for action in (*steers, *gate) if visit.is_on(f"#{action}")} == shown
 
 
 def test_a_game_that_is_over_is_voided_in_the_list_alone(visit: Visit, runner: Runner):

@@ -18,6 +18,7 @@ from shared.study.events import Answered, Consented, GameEnded, Ranked
 from shared.study.journal import Journal, read_journal
 from shared.study.progress import replay
 from tests.integration.page.browsing import find_chromium
+from tests.integration.study_pages.people import LEAD, TAKE_PART
 from tests.integration.study_pages.rig import TOKEN
 from tests.unit.study.runner_stand import Stand
 
@@ -50,27 +51,6 @@ class Lab(Stand):
         super().kill_study()
         assert self.web is not None
         self.web.close()
-
-
-CLICK = """(...selectors) => {
-  for (const selector of selectors) {
-    const found = document.querySelector(selector);
-    if (found && found.checkVisibility() && !found.matches(":disabled, :checked")) found.click();
-  }
-}"""
-TAKE_PART = f"""() => {{
-  document.querySelector(".paper")?.scrollTo(0, 1e6);
-  ({CLICK})(".tick input", "[data-item=fun] label:nth-child(4) input",
-    ".rank:nth-of-type(2) label:nth-of-type(1) input",
-    ".rank:nth-of-type(3) label:nth-of-type(2) input", ".form .main", "#button");
-  return window.study?.view()?.screen ?? "";
-}}"""
-"""Does what the participant's page asks for; returns its screen."""
-LEAD = f"""() => {{
-  if (window.study?.view()?.gate.mode === "disarmed") ({CLICK})("#arm");
-  ({CLICK})("#begin");
-}}"""
-"""Does what a researcher does."""
 
 
 @pytest.mark.timeout(300)
