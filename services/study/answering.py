@@ -234,7 +234,7 @@ class Answering:
         session.write(Paused(reason=ask.reason), step.id if step is not None else "", ask.id)
         moment = session.moment
         if moment.stage == "countdown":
-            moment = replace(moment, stage="ready")
+            moment = replace(moment, stage="ready", loaded="")
         if step is not None and step.kind == "baseline" and moment.stage == "timer":
             session.start_over("it was paused, and is measured anew")
             moment = session.moment

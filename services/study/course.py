@@ -261,11 +261,13 @@ def _playing(step: Step, moment: Moment, heard: Heard, now: float) -> Action:
 
 
 def _unmoved(step: Step, heard: Heard) -> str:
-    """Return why the robot cannot move any more in a game; empty where it can, or need not."""
+    """Return why the robot cannot play any more in a game; empty where it can, or need not."""
     if step.kind == "explore":
         return ""
     if heard.gate is None:
         return "robot_io is silent"
+    if not heard.has_policy:  # restarted, it would play on as somebody else
+        return "the policy died"
     if heard.mode not in MOVING:
         return f"the robot is {heard.mode}: {heard.gate.reason}"
     return ""

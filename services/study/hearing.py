@@ -38,6 +38,7 @@ class Heard(msgspec.Struct, frozen=True, kw_only=True):
     heart: HeartRate | None = None
     """The newest, while it is fresh."""
     has_policy: bool = False
+    """Whether the robot's is there."""
     has_recorder: bool = False
 
     @property
@@ -133,6 +134,6 @@ class Hearing:
             lost_seconds=now - self._tracked_at,
             beats=beats,
             heart=self._heart if now - self._heart_at <= HEART_SILENCE else None,
-            has_policy=bool(self._bus.alive("policy")),
+            has_policy=any("antagonist" not in name for name in self._bus.alive("policy")),
             has_recorder=bool(self._bus.alive("recorder")),
         )

@@ -24,7 +24,6 @@ from services.study.course import (
     Turn,
     Wait,
     next_action,
-    player_of,
 )
 from services.study.errands import Errands
 from services.study.hearing import Heard
@@ -88,6 +87,8 @@ class Session:
         """What a person said of the game that is on: how it counts, why, and the ask's id."""
         self.ended_asks: list[str] = []
         """Asks about the game that was on, done by now."""
+        self._asked_player = ""
+        """Whom the policy was asked to be last, as the protocol calls it."""
         self._journal = journal
         self._clock = clock
         self.progress = replay(journal.events)
@@ -149,11 +150,13 @@ class Session:
         return step.kind == "game" and step.game > 1 and is_first_try
 
     def start_over(self, trouble: str = "") -> None:
-        """Go back to where a person lets the step begin."""
+        """Go back to where a person lets the step begin.
+
+        The policy is told whom to play before each game: it may have been restarted meanwhile.
+        """
         self.moment = Moment(
-            loaded=self.moment.loaded, reference=self.moment.reference, trouble=trouble,
-            is_paused=self.progress.is_paused, since=self._clock.now(),
-        )  # fmt: skip
+            trouble=trouble, is_paused=self.progress.is_paused, since=self._clock.now()
+        )
 
     def finish(self, step: Step, reason: str = "", ask: str = "") -> None:
         """The step is over; after the last one the session is."""
@@ -223,6 +226,7 @@ class Session:
                 self.moment = replace(self.moment, is_waiting=True)
             case Load(player=player):
                 self.errands.load(self.plan.players.get(player, player))
+                self._asked_player = player
                 self.moment = replace(self.moment, is_waiting=True)
             case _ if step is None:
                 pass
@@ -231,8 +235,10 @@ class Session:
                 until = now + self._left(step, seconds)
                 self.moment = replace(self.moment, stage=stage, since=now, until=until, trouble="")
             case Turn(stage=stage, seconds=seconds):
-                until = now + seconds
-                self.moment = replace(self.moment, stage=stage, since=now, until=until)
+                loaded = "" if stage == "ready" else self.moment.loaded
+                self.moment = replace(
+                    self.moment, stage=stage, since=now, until=now + seconds, loaded=loaded
+                )
             case Start():
                 self._start(step, now)
             case End():
@@ -333,9 +339,9 @@ class Session:
         step = self.step
         if player is not None:
             self.moment = replace(self.moment, is_waiting=False)
-            if player.is_accepted and step is not None:
+            if player.is_accepted:
                 self.moment = replace(
-                    self.moment, loaded=player_of(step), reference=player.player, trouble=""
+                    self.moment, loaded=self._asked_player, reference=player.player, trouble=""
                 )
             else:
                 self.moment = replace(

@@ -135,6 +135,8 @@ def test_a_bout_whose_gate_shut_is_abandoned_once_at_a_time(mode: str):
     assert act(GAME, PLAYING, heard) == Steer("abandon", PLAYING.bout, f"the robot is {mode}: why")
     assert act(GAME, replace(PLAYING, is_waiting=True), heard) == Wait()
     assert act(GAME, replace(PLAYING, retry_at=12.0), heard) == Wait()
+    alone = replace(HEARD, has_policy=False, referee=said("running", PLAYING.bout))
+    assert act(GAME, PLAYING, alone) == Steer("abandon", PLAYING.bout, "the policy died")
     silent = replace(heard, gate=None)
     assert act(GAME, PLAYING, silent) == Steer("abandon", PLAYING.bout, "robot_io is silent")
 

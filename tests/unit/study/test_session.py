@@ -53,7 +53,8 @@ def test_the_policy_changes_between_sections_only_and_nobody_plays_while_one_exp
     walked: Stand,
 ):
     stand = walked
-    assert stand.loaded == ["scripted:static", "scripted:guard", "scripted:heuristic"]
+    guard, heuristic = ["scripted:guard"], ["scripted:heuristic"]
+    assert stand.loaded == ["scripted:static", *3 * guard, *2 * heuristic]  # before each game
     told = {state.bout: state for state in stand.bouts if state.bout}
     explore = next(state for name, state in told.items() if name.startswith("explore"))
     assert (explore.speed, explore.is_recorded) == (0.0, False)
