@@ -65,7 +65,7 @@ ANY = st.builds(
 )  # fmt: skip
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(forms())
 def test_what_a_page_makes_of_a_form_lacks_nothing(form: tuple[list[Item], list[Answer]]):
     made, answers = form
@@ -75,7 +75,7 @@ def test_what_a_page_makes_of_a_form_lacks_nothing(form: tuple[list[Item], list[
         assert lacks_of(made, left_out) == ([f"{item.id} has no answer"] * item.is_required)
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(forms(), st.lists(ANY, max_size=4))
 def test_what_lacks_nothing_answers_every_required_item_and_fits_it(
     form: tuple[list[Item], list[Answer]], answers: list[Answer]
@@ -96,7 +96,7 @@ def test_what_lacks_nothing_answers_every_required_item_and_fits_it(
             assert item.scale == "ranking" or answer.ranks == ()
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(st.lists(ANY, max_size=5), TEXT)
 def test_an_ask_comes_through_the_wire_as_it_was_said(answers: list[Answer], step: str):
     ask = ParticipantAsk(id="a-1", action="answers", step=step, answers=tuple(answers))
