@@ -48,6 +48,6 @@ def summary_text(results: Results) -> str:
     lines = [results.title, ""]
     for chapter in results.chapters:
         if chapter.says:
-            text = f"{chapter.title}: {' '.join(chapter.says[:2])}"
+            text = f"{chapter.title}: {' '.join(chapter.says[: chapter.headlines])}"
             lines += [*textwrap.wrap(text, WIDTH, subsequent_indent="  "), ""]
     return "\n".join(lines).rstrip()

@@ -41,7 +41,9 @@ class Chapter:
     key: str
     title: str
     says: tuple[str, ...] = ()
-    """Plain sentences, the most important first: it goes into the summary."""
+    """Plain sentences, the most important first."""
+    headlines: int = 1
+    """How many of them stand in the summary."""
     findings: tuple[Finding, ...] = ()
     tables: tuple[Table, ...] = ()
     pictures: tuple[Picture, ...] = ()

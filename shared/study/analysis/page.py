@@ -14,8 +14,6 @@ from shared.study.analysis.methods import Methods, paragraph
 from shared.telemetry import html
 from shared.telemetry.html import Html, Node, tag
 
-IN_SUMMARY = 3
-"""Sentences of each chapter that stand at the top."""
 P_COLUMNS = ("p", "p (Holm)", "p, clustered by person")
 
 
@@ -32,7 +30,7 @@ def report_page(title: str, is_blinded: bool, methods: Methods, chapters: Sequen
 def _head(title: str, is_blinded: bool, chapters: Sequence[Chapter]) -> Node:
     shown = "conditions under blinded labels" if is_blinded else "conditions by name"
     said = [
-        tag("li", tag("b", f"{chapter.title}. "), " ".join(chapter.says[:IN_SUMMARY]))
+        tag("li", tag("b", f"{chapter.title}. "), " ".join(chapter.says[: chapter.headlines]))
         for chapter in chapters
         if chapter.says
     ]
@@ -46,11 +44,9 @@ def _head(title: str, is_blinded: bool, chapters: Sequence[Chapter]) -> Node:
 
 
 def _chapter(chapter: Chapter) -> Html:
-    more = chapter.says[IN_SUMMARY:]
     return html.section(
         chapter.title,
-        [tag("p", " ".join(chapter.says[:IN_SUMMARY]))] if chapter.says else None,
-        tag("ul", [tag("li", sentence) for sentence in more]) if more else None,
+        tag("ul", [tag("li", sentence) for sentence in chapter.says]) if chapter.says else None,
         [html.figure(html.svg(picture.draw()), picture.caption) for picture in chapter.pictures],
         [_table(table) for table in chapter.tables],
         _tests(chapter.findings),
@@ -64,16 +60,24 @@ def _table(table: Table) -> Node:
         if any(row[k] is not None for row in table.rows)
         and all(isinstance(row[k], int | float | None) or _is_share(row[k]) for row in table.rows)
     ]
+    places = [_places([row[k] for row in table.rows]) for k in range(len(table.columns))]
     rows = [
-        [_cell(value, table.columns[k]) for k, value in enumerate(row)] for row in table.rows
-    ]  # fmt: skip
+        [_cell(value, table.columns[k], places[k]) for k, value in enumerate(row)]
+        for row in table.rows
+    ]
     made = html.table(table.columns, rows, numbers=numbers, caption=table.note or None)
     if table.is_folded:
         return html.details(table.title, made)
     return [tag("h3", table.title), made]
 
 
-def _cell(value: str | float | int | None, column: str) -> str:
+def _places(column: Sequence[str | float | int | None]) -> int:
+    """Return how many decimals a column needs, so that its points stand under each other."""
+    texts = [f"{value:.6g}" for value in column if isinstance(value, float)]
+    return max((len(t.partition(".")[2]) for t in texts if "e" not in t), default=0)
+
+
+def _cell(value: str | float | int | None, column: str, places: int) -> str:
     if value is None:
         return "-"
     if isinstance(value, str):
@@ -82,11 +86,13 @@ def _cell(value: str | float | int | None, column: str) -> str:
         return p_text(float(value))
     if isinstance(value, int):
         return f"{value:,}".replace("-", "\N{MINUS SIGN}")
-    return f"{value:,.6g}".replace("-", "\N{MINUS SIGN}")
+    if value and not 1e-4 <= abs(value) < 1e9:
+        return f"{value:.3g}".replace("-", "\N{MINUS SIGN}")
+    return f"{value:,.{places}f}".replace("-", "\N{MINUS SIGN}")
 
 
 def _is_share(value: str | float | int | None) -> bool:
-    return isinstance(value, str) and value.endswith("%") and value[:1].isdigit()
+    return isinstance(value, str) and value[:1].isdigit() and " %" in value and "to" not in value
 
 
 def _tests(findings: Sequence[Finding]) -> Node:

@@ -40,6 +40,8 @@ class ChapterResults(msgspec.Struct, frozen=True, kw_only=True):
     key: str
     title: str
     says: tuple[str, ...]
+    headlines: int
+    """How many of them stand in the summary."""
     findings: tuple[Finding, ...]
     tables: tuple[Table, ...]
 
@@ -108,8 +110,8 @@ def analyse(tables: Tables, moves: Moves, *, seed: int = SEED) -> Analysis:
         people=len(games.people),
         methods=methods_of(tables, seed),
         chapters=tuple(
-            ChapterResults(key=c.key, title=c.title, says=c.says, findings=c.findings,
-                           tables=c.tables)
+            ChapterResults(key=c.key, title=c.title, says=c.says, headlines=c.headlines,
+                           findings=c.findings, tables=c.tables)
             for c in chapters
         ),
     )  # fmt: skip

@@ -13,7 +13,7 @@ from shared.study.analysis.chapter import (
     estimate_words,
     interval_text,
     listing,
-    number_text,
+    p_text,
     p_words,
     percent_text,
     significant,
@@ -54,7 +54,8 @@ def acceptance_chapter(
             says.append(_difference(scale, compared))
         tables_made += _by_group(tables, games, scale)
     return Chapter(
-        key="acceptance", title="Acceptance", says=tuple(says), findings=tuple(findings),
+        key="acceptance", title="Acceptance", says=tuple(says), headlines=len(says),
+        findings=tuple(findings),
         tables=tuple(tables_made), pictures=tuple(pictures),
     )  # fmt: skip
 
@@ -83,9 +84,8 @@ def _answers(scale: Scale) -> Table:
         columns=("construct", *(("condition",) if scale.conditions != ("",) else ()), *options,
                  "median", "answers"),
         rows=tuple(rows),
-        note="Share of the answers; a missing answer is left out. "
-        + ("The median is over people's means of a construct's items; " if several else "")
-        + "reversed items are turned round.",
+        note="Share of the answers; a missing answer is left out, a reversed item turned round."
+        + (" The median is over people's means of a construct's items." if several else ""),
     )  # fmt: skip
 
 
@@ -169,7 +169,7 @@ def _difference(scale: Scale, findings: Sequence[Finding]) -> str:
     if not found:
         tested = [finding for finding in findings if finding.p is not None]
         least = min((p for p in (f.decisive_p for f in tested) if p is not None), default=None)
-        smallest = "" if least is None else f" (smallest p after Holm {number_text(least, 2)})"
+        smallest = "" if least is None else f" (smallest p after Holm: {p_text(least)})"
         return f"{name}: no construct differs significantly between conditions{smallest}."
     words = [
         f"{finding.question} {estimate_words(finding.estimate)}, {p_words(finding)}"

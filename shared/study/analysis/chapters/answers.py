@@ -34,6 +34,7 @@ def answers_chapter(tables: Tables, games: Games) -> Chapter | None:
     if not made:
         return None
     return Chapter(key="answers", title="Choices, adjectives and words", says=tuple(says),
+                   headlines=len(says),
                    findings=tuple(findings), tables=tuple(made))  # fmt: skip
 
 
@@ -124,7 +125,7 @@ def _share(option: str, sections: Sequence[Sequence[str]]) -> str:
 def _counted_words(table: Table) -> str:
     ordered = sorted(table.rows, key=lambda row: -int(row[1] or 0))
     top = ", ".join(f"{row[0]} ({row[2]})" for row in ordered[:3])
-    return f"{table.title}: most often {top}."
+    return f"Most often chosen of {table.title.rpartition(': ')[2]}: {top}."
 
 
 def _open(tables: Tables) -> Table | None:

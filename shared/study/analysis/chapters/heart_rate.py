@@ -74,8 +74,10 @@ def heart_rate_chapter(
         "Peak heart rate of each game over the person's walking heart rate, by section; the lines "
         "are the limits of the heart-rate levels.",
     )]  # fmt: skip
+    felt: list[Table] = []
     if adjectives is not None:
         options, panels = adjectives
+        felt.append(_felt_table(options, panels))
         pictures.append(Picture(
             lambda: adjective_panels(panels, options),
             "Share of sections that were described by each adjective, by the section's "
@@ -85,8 +87,9 @@ def heart_rate_chapter(
         key="heart-rate",
         title="Heart rate",
         says=(*says, *beats.left_out),
+        headlines=len(says),
         findings=(*tests, *shares),
-        tables=(levels, _people_table(beats, games)),
+        tables=(levels, *felt, _people_table(beats, games)),
         pictures=tuple(pictures),
     )
 
@@ -260,12 +263,27 @@ def _adjectives(
                     sections[int(_level_of(np.array([level]))[0])].append(options)
         panels = [
             (f"{name} (n = {len(chosen_in)})",
-             [sum(option in options for options in chosen_in) / max(len(chosen_in), 1)
+             [sum(option in options for options in chosen_in) / len(chosen_in)
               for option in item.options])
             for name, chosen_in in zip(LEVELS, sections, strict=True)
+            if chosen_in
         ]  # fmt: skip
         return list(item.options), panels
     return None
+
+
+def _felt_table(options: list[str], panels: list[tuple[str, list[float]]]) -> Table:
+    return Table(
+        name="adjectives_by_level",
+        title="Adjectives by heart-rate level",
+        columns=("adjective", *(title for title, _ in panels)),
+        rows=tuple(
+            (option, *(percent_text(shares[k]) for _, shares in panels))
+            for k, option in enumerate(options)
+        ),
+        note="Share of the sections at a level that were described so.",
+        is_folded=True,
+    )
 
 
 def _by_section(beats: Beats) -> list[Floats]:

@@ -63,6 +63,7 @@ def learning_chapter(games: Games, generator: np.random.Generator) -> Chapter | 
         key="learning",
         title="Learning",
         says=tuple(says),
+        headlines=3,
         findings=(*lines, *means, *compared, *mixed, *holm(rises), *switch),
         tables=(_lines_table(lines, names), _slopes_table(games)),
         pictures=(
@@ -129,8 +130,7 @@ def _line_words(lines: list[Finding], names: tuple[str, ...]) -> list[str]:
     ]
     if not parts:
         return []
-    return [f"A line through all games rises {listing(parts)}, games of a person taken as "
-            "independent."]  # fmt: skip
+    return [f"A line through all games, taken as independent, rises {listing(parts)}."]
 
 
 def _compared_words(compared: list[Finding], mixed: list[Finding]) -> list[str]:

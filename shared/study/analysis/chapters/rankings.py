@@ -57,14 +57,15 @@ def rankings_chapter(
             panels.append(_panel(item.id, name, names, cube))
     if not cubes:
         return None
+    says.sort(key=lambda sentence: " by section " in sentence)
     for first, second in itertools.combinations(cubes, 2):
         tests = _together(first, second, cubes[first], cubes[second])
         findings += tests
-        says.append(_together_words(first, second, tests))
+        says.insert(len(cubes), _together_words(first, second, tests))
     ends = "; ".join(f"{item.id}: 1 = {item.ends[0]}" for item in questions if item.ends)
     return Chapter(
-        key="rankings", title="Rankings", says=tuple(says), findings=tuple(findings),
-        tables=tuple(tables_made),
+        key="rankings", title="Rankings", says=tuple(says), headlines=len(cubes) + 1,
+        findings=tuple(findings), tables=tuple(tables_made),
         pictures=(Picture(lambda: rank_panels(panels),
                           f"Mean rank with its standard error ({ends})."),),
     )  # fmt: skip
@@ -113,23 +114,22 @@ def _tests(
 def _words(
     question: str, kind: str, names: tuple[str, ...], cube: Floats, tests: list[Finding]
 ) -> str:
-    means = ", ".join(f"{name} {number_text(mean_there(column), 3)}"
+    means = ", ".join(f"{name.removeprefix('section ')} {number_text(mean_there(column), 3)}"
                       for name, column in zip(names, cube.T, strict=True)
                       if np.isfinite(column).any())  # fmt: skip
-    text = f"Mean rank of {question} by {kind}: {means}."
-    overall = [test for test in tests if test.test == "repeated-measures ANOVA"]
-    for test in overall:
-        what = test.question.removeprefix(f"{question} over ")
-        if test.p is not None:
+    parts: list[str] = []
+    for test in tests:
+        if test.test == "repeated-measures ANOVA" and test.p is not None:
+            what = test.question.removeprefix(f"{question} over ")
             differ = verdict(test, "differ", "do not differ significantly")
-            text += f" {what[0].upper()}{what[1:]} {differ} ({p_words(test)})."
+            parts.append(f"{what} {differ} ({p_words(test)})")
     pairs = significant([test for test in tests if test.test == "paired t-test"])
     if pairs:
-        words = [f"{test.question.removeprefix(f'{question}: ')} "
-                 f"{number_text(test.estimate.value, 2)} ({p_words(test)})"
-                 for test in pairs if test.estimate is not None]  # fmt: skip
-        text += f" Pairs that differ: {listing(words)}."
-    return text
+        words = [f"{test.question.removeprefix(f'{question}: ')} ({p_words(test)})"
+                 for test in pairs]  # fmt: skip
+        parts.append(f"pairs that differ: {listing(words)}")
+    head = f"{question.capitalize()} by {kind} (mean ranks: {means})"
+    return f"{head}: {'; '.join(parts) or 'no test was done'}."
 
 
 def _table(question: str, kind: str, names: tuple[str, ...], cube: Floats) -> Table:

@@ -39,6 +39,7 @@ def scores_chapter(games: Games, generator: np.random.Generator) -> Chapter | No
         key="scores",
         title="Scores",
         says=tuple(says),
+        headlines=2,
         findings=tuple(findings),
         tables=(_table(games), _by_game(games)),
         pictures=(
@@ -114,7 +115,8 @@ def _table(games: Games) -> Table:
         rows.append((
             name, people, len(there), round(float(there.mean()), 1),
             round(float(there.std(ddof=1)), 1) if len(there) > 1 else None,
-            float(there.max()), float(there.min()), round(best[k][1], 1), best[k][0],
+            round(float(there.max()), 1), round(float(there.min()), 1), round(best[k][1], 1),
+            best[k][0],
         ))  # fmt: skip
     return Table(
         name="scores",

@@ -11,7 +11,6 @@ from shared.study.analysis.chapter import (
     interval_text,
     listing,
     number_text,
-    p_text,
     p_words,
     significant,
 )
@@ -73,7 +72,7 @@ def strategy_chapter(games: Games, moves: Moves, generator: np.random.Generator)
             "worst's (geometric means, 95 %); above 1 the best moved more variedly.",
         ))  # fmt: skip
     return Chapter(
-        key="strategy", title="Variety and success", says=tuple(says),
+        key="strategy", title="Variety and success", says=tuple(says), headlines=3,
         findings=(*tests, *shuffles, *style), tables=table, pictures=tuple(pictures),
     )  # fmt: skip
 
@@ -98,8 +97,9 @@ def _words(tests: list[Finding], shuffles: tuple[Finding, ...]) -> list[str]:
         said.append(
             "A maximum is larger where games vary more, whoever plays: with games shuffled between "
             f"people the correlation with the maximum is "
-            f"{number_text(shuffles[0].estimate.value, 2)} on average; that the true one is larger "
-            f"has p {p_text(shuffles[0].p)}."
+            f"{number_text(shuffles[0].estimate.value, 2)} on average; the one found is "
+            f"{'' if shuffles[0].is_significant else 'not '}significantly larger "
+            f"({p_words(shuffles[0])})."
         )
     return said
 
