@@ -21,6 +21,7 @@ from shared.runtime.serve import EXIT_BAD_INPUT, EXIT_BUS_LOST, ServeArgs, serve
 from shared.sim.config import SimConfig
 from shared.sim.env import FencingEnv
 from shared.sim.model import FencingModel
+from shared.sim.worlds import worlds_of
 
 
 def build(args: ServeArgs, bus: Bus, clock: Clock) -> Actor:
@@ -28,7 +29,8 @@ def build(args: ServeArgs, bus: Bus, clock: Clock) -> Actor:
     cfg = args.section("actor", ActorConfig)
     action = args.section("action", ActionConfig)
     model = FencingModel.build(args.section("sim", SimConfig))
-    env = FencingEnv(model, args.section("game", RuleBook), action, cfg.num_envs)
+    worlds = worlds_of(cfg.backend, model, cfg.num_envs, cfg.device)
+    env = FencingEnv(model, args.section("game", RuleBook), action, cfg.num_envs, worlds=worlds)
     fit = Fit.of(action, model.cfg.control_timestep, model.hash)
     try:
         return Actor(cfg, args.section("reward", RewardConfig), env, fit, bus, clock)

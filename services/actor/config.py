@@ -2,6 +2,8 @@
 
 import msgspec
 
+from shared.sim.worlds import Backend
+
 
 class ActorConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How many bouts one actor plays at once, and how it hands them over."""
@@ -20,6 +22,10 @@ class ActorConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Seconds of wall clock between two sampled stretches of a bout for viewers; 0 sends none."""
     frame_steps: int = 4
     """Control steps between two frames of a stretch."""
+    backend: Backend = "cpu"
+    """What steps the physics: MuJoCo on the processor, or mujoco_warp on a graphics card."""
+    device: str = ""
+    """Of ``warp``: ``cuda:0``; empty takes the first card."""
 
     def __post_init__(self) -> None:
         """Check the ranges."""

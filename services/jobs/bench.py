@@ -21,7 +21,7 @@ import msgspec
 
 from services.jobs.doctor.machine import processor
 from shared.config.site import nearest
-from shared.errors import ConfigError
+from shared.errors import ConfigError, RiposteError
 from shared.runtime.build import SOURCE_ROOT, commit
 from shared.runtime.process import THREAD_LIMITS
 
@@ -40,6 +40,10 @@ interval over seeds. A load beside the number of cores says whether the machine 
 """
 PACKAGES = ("mujoco", "numpy", "torch", "rsl-rl-lib", "eclipse-zenoh")
 """Whose versions stand in a row."""
+
+
+class NotHereError(RiposteError):
+    """What a benchmark is about is not on this machine; says what."""
 
 
 class Check(msgspec.Struct, frozen=True, kw_only=True):
@@ -127,7 +131,12 @@ def main(argv: Sequence[str]) -> int:
         )
     if found.smoke and found.write:
         raise ConfigError("--write keeps figures that mean something: leave --smoke out")
-    report = run(found.name, smoke=found.smoke)
+    try:
+        report = run(found.name, smoke=found.smoke)
+    except NotHereError as why:
+        skipped = msgspec.json.encode({"name": found.name, "skipped": str(why)}).decode()
+        print(skipped if found.json else f"{found.name} skipped: {why}")
+        return 0
     print(msgspec.json.encode(report).decode() if found.json else text_of(report))
     if found.write:
         add_row(folder / RESULTS, report, f"riposte bench {found.name}")

@@ -43,6 +43,8 @@ class LearnerConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     """Samples that only teach the observation normaliser before the first update."""
     keep_checkpoints: int = 3
     """Checkpoints kept on disk, newest first."""
+    device: str = "cpu"
+    """Where PPO computes: ``cpu``, ``cuda`` or ``cuda:N``, with a torch that knows it."""
 
     def __post_init__(self) -> None:
         """Check the ranges."""

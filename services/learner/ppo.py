@@ -18,6 +18,7 @@ from rsl_rl.storage import RolloutStorage
 from tensordict import TensorDict
 
 from services.learner.config import LearnerConfig
+from services.learner.devices import RandomState, device_of
 from services.learner.gae import advantages_and_returns
 from shared.errors import CheckpointError
 from shared.messages.training import ACTION_DIM, OBS_DIM, Rollout
@@ -49,12 +50,23 @@ class PolicyOptimiser:
     """Actor, critic, normalisers, Adam and the random state of one agent."""
 
     def __init__(self, cfg: LearnerConfig, seed: int) -> None:
+        """Build them.
+
+        Args:
+            cfg: of the learner.
+            seed: of weights and minibatches.
+
+        Raises:
+            ConfigError: there is no such device.
+        """
         torch.set_num_threads(1)
         self.cfg = cfg
-        with torch.random.fork_rng(devices=[]):
+        self._device = device_of(cfg.device)
+        self._random = RandomState(self._device)
+        with self._random.forked():
             torch.manual_seed(seed)
             self._algorithm = self._build()
-            self._random_state = torch.get_rng_state()
+            self._random.keep()
 
     def _build(self) -> PPO:
         """Return a fresh algorithm; draws the weights from torch's current generator."""
@@ -84,9 +96,9 @@ class PolicyOptimiser:
             last.weight.mul_(0.01)
             last.bias.zero_()
         algorithm = PPO(
-            actor,
-            critic,
-            RolloutStorage("rl", 1, 1, proto, [ACTION_DIM]),
+            actor.to(self._device),
+            critic.to(self._device),
+            RolloutStorage("rl", 1, 1, proto, [ACTION_DIM], device=str(self._device)),
             num_learning_epochs=cfg.epochs,
             num_mini_batches=cfg.minibatches,
             clip_param=cfg.clip,
@@ -98,13 +110,14 @@ class PolicyOptimiser:
             max_grad_norm=cfg.max_grad_norm,
             use_clipped_value_loss=False,
             schedule="fixed",
+            device=str(self._device),
         )
         algorithm.train_mode()
         return algorithm
 
     def warm_up(self, rollouts: Sequence[Rollout]) -> None:
         """Teach the normalisers, and nothing else, from these rollouts."""
-        obs = _observations(torch.from_numpy(_stack(rollouts, "obs")))
+        obs = _observations(self._rows(rollouts, "obs"))
         self._algorithm.actor.update_normalization(obs)
         self._algorithm.critic.update_normalization(obs)
 
@@ -119,28 +132,28 @@ class PolicyOptimiser:
         """
         for group in self._algorithm.optimizer.param_groups:
             group["lr"] = learning_rate or self.cfg.learning_rate
-        with torch.random.fork_rng(devices=[]):
-            torch.set_rng_state(self._random_state)
+        with self._random.forked():
+            self._random.put_back()
             stats = self._update(rollouts)
-            self._random_state = torch.get_rng_state()
+            self._random.keep()
         return stats
 
     def _update(self, rollouts: Sequence[Rollout]) -> UpdateStats:
         algorithm = self._algorithm
-        obs = _observations(torch.from_numpy(_stack(rollouts, "obs")))
-        actions = torch.from_numpy(_stack(rollouts, "actions"))
-        means = torch.from_numpy(_stack(rollouts, "means"))
-        old_log_probs = torch.from_numpy(_stack(rollouts, "log_probs"))
+        obs = _observations(self._rows(rollouts, "obs"))
+        actions = self._rows(rollouts, "actions")
+        means = self._rows(rollouts, "means")
+        old_log_probs = self._rows(rollouts, "log_probs")
         stds = torch.cat(
             [torch.tensor(r.stds).expand(r.rewards.size, ACTION_DIM) for r in rollouts]
-        )
+        ).to(self._device)
         samples = len(actions)
         with torch.no_grad():
             values = algorithm.critic(obs).squeeze(-1)
             advantages, returns = self._targets(rollouts, values)
             normalised = (advantages - advantages.mean()) / (advantages.std() + 1e-8)
 
-        storage = RolloutStorage("rl", 1, samples, obs[:1], [ACTION_DIM])
+        storage = RolloutStorage("rl", 1, samples, obs[:1], [ACTION_DIM], device=str(self._device))
         storage.observations["policy"] = obs["policy"][:, None]
         storage.actions = actions[:, None]
         storage.values = values[:, None, None]
@@ -181,22 +194,28 @@ class PolicyOptimiser:
             action_std=float(new_params[1][0].mean()),
         )
 
+    def _rows(self, rollouts: Sequence[Rollout], field: str, axes: int = 2) -> torch.Tensor:
+        """Return one field of all rollouts, their first ``axes`` axes flattened into one."""
+        parts = [getattr(rollout, field) for rollout in rollouts]
+        stacked = np.concatenate([part.reshape(-1, *part.shape[axes:]) for part in parts])
+        return torch.from_numpy(stacked).to(self._device)
+
     def _targets(
         self, rollouts: Sequence[Rollout], values: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """Return advantages float32[M] and returns float32[M], rollout by rollout."""
-        last_obs = _observations(torch.from_numpy(_stack(rollouts, "last_obs", rows=1)))
+        last_obs = _observations(self._rows(rollouts, "last_obs", axes=1))
         last_values = self._algorithm.critic(last_obs).squeeze(-1)
         advantages, returns = [], []
         row, world = 0, 0
         for rollout in rollouts:
             steps, worlds = rollout.rewards.shape
             one_advantages, one_returns = advantages_and_returns(
-                torch.tensor(rollout.rewards),
+                torch.tensor(rollout.rewards, device=self._device),
                 values[row : row + steps * worlds].view(steps, worlds),
                 last_values[world : world + worlds],
                 # A bout ends by its clock alone: truncated, never terminated.
-                torch.zeros(worlds, dtype=torch.bool),
+                torch.zeros(worlds, dtype=torch.bool, device=self._device),
                 self.cfg.gamma,
                 self.cfg.gae_lambda,
             )
@@ -221,20 +240,20 @@ class PolicyOptimiser:
     def state(self) -> dict[str, torch.Tensor]:
         """Return every tensor that the next update depends on, by name."""
         algorithm = self._algorithm
-        state = {"random_state": self._random_state.clone()}
+        state = self._random.state()
         for part in ("actor", "critic"):
             for name, value in getattr(algorithm, part).state_dict().items():
-                state[f"{part}.{name}"] = value.detach().clone()
+                state[f"{part}.{name}"] = value.detach().cpu().clone()
         for index, moments in algorithm.optimizer.state_dict()["state"].items():
             for name, value in moments.items():
-                state[f"adam.{index}.{name}"] = value.detach().clone()
+                state[f"adam.{index}.{name}"] = value.detach().cpu().clone()
         return state
 
     def reseed(self, seed: int) -> None:
         """Draw the minibatches from another seed from now on."""
-        with torch.random.fork_rng(devices=[]):
+        with self._random.forked():
             torch.manual_seed(seed)
-            self._random_state = torch.get_rng_state()
+            self._random.keep()
 
     def restore(self, state: dict[str, torch.Tensor]) -> None:
         """Continue from what ``state`` returned.
@@ -257,16 +276,10 @@ class PolicyOptimiser:
             for part, tensors in parts.items():
                 getattr(algorithm, part).load_state_dict(tensors)
             algorithm.optimizer.load_state_dict(optimizer)
-            self._random_state = state["random_state"].clone()
+            self._random.restore(state)
         except (KeyError, RuntimeError, ValueError) as error:
             text = " ".join(str(error).split())
             raise CheckpointError(f"checkpoint does not fit this network: {text}") from None
-
-
-def _stack(rollouts: Sequence[Rollout], field: str, rows: int = 2) -> NDArray[np.float32]:
-    """Return one field of all rollouts, their first ``rows`` axes flattened into one."""
-    parts = [getattr(rollout, field) for rollout in rollouts]
-    return np.concatenate([part.reshape(-1, *part.shape[rows:]) for part in parts])
 
 
 def _numpy(tensor: torch.Tensor) -> NDArray[np.float32]:

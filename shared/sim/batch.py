@@ -44,9 +44,6 @@ class FencingBatch:
     """float64[N, 14], joint angles, antagonist first (rad)."""
     qvel: Float64
     """float64[N, 14] (rad/s)."""
-    step: Callable[[], None]
-    """Advance every world by one control step; ``sensors`` are current afterwards."""
-
     def __init__(
         self,
         model: FencingModel,
@@ -78,10 +75,11 @@ class FencingBatch:
         self.qvel = self._batch.bind("qvel")
         cfg = model.cfg
         self._path: CommandPath | None = None
+        # step() advances every world by one control step; sensors are current afterwards.
         if model.parameters.command.is_direct:
             self.ctrl = self._applied
             self._advance = partial(self._batch.step, None, cfg.substeps, _STAGE)
-            self.step = self._step_direct
+            self.step: Callable[[], None] = self._step_direct
         else:
             self.ctrl = np.zeros_like(self._applied)
             self._advance = partial(self._batch.step, None, 1, _STAGE)

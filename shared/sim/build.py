@@ -48,7 +48,11 @@ def base_position(cfg: SimConfig) -> Float64:
 
 
 def build_spec(
-    cfg: SimConfig, parameters: ModelParameters, agents: tuple[str, ...] = AGENTS
+    cfg: SimConfig,
+    parameters: ModelParameters,
+    agents: tuple[str, ...] = AGENTS,
+    *,
+    has_goal_sites: bool = False,
 ) -> mujoco.MjSpec:
     """Return the physics of the scene, uncompiled.
 
@@ -56,6 +60,9 @@ def build_spec(
         cfg: the scene and its time steps.
         parameters: the simulator's parameters.
         agents: who stands in the scene, in the order of sensors and controls.
+        has_goal_sites: the orientation servo is three actuators about the axes of a site
+            ``AGENT/goal``, whose orientation is the command, for simulators without orientation
+            actuators: the same torque, with controls that stay zero.
     """
     spec = mujoco.MjSpec()
     spec.modelname = "riposte"
@@ -65,7 +72,7 @@ def build_spec(
     for agent in agents:
         _add_robot(spec, cfg, parameters, agent)
     for agent in agents:
-        _add_servo(spec, parameters, agent)
+        _add_servo(spec, parameters, agent, has_goal_sites=has_goal_sites)
         _add_sensors(spec, agent)
     if len(agents) == 2:
         _add_contacts(spec, cfg)
@@ -189,7 +196,9 @@ def _add_bat(body: mujoco.MjsBody, bat: BatParameters, arm: Arm, agent: str) -> 
     )
 
 
-def _add_servo(spec: mujoco.MjSpec, parameters: ModelParameters, agent: str) -> None:
+def _add_servo(
+    spec: mujoco.MjSpec, parameters: ModelParameters, agent: str, *, has_goal_sites: bool
+) -> None:
     """Add the agent's 7 controls: three translations and an orientation of its tool."""
     translation, orientation = parameters.servo.translation, parameters.servo.orientation
     target, reference = f"{agent}/tool", f"{agent}/torso"
@@ -203,6 +212,19 @@ def _add_servo(spec: mujoco.MjSpec, parameters: ModelParameters, agent: str) -> 
         own = parameters.of_kind(AxisGains, _AXES[axis]) or translation
         servo.set_to_position(kp=own.kp, kv=own.kv)
         servo.gear = [float(axis == other) for other in range(6)]
+    own = parameters.of_kind(AxisGains, "orientation") or orientation
+    if has_goal_sites:
+        spec.body(reference).add_site(name=f"{agent}/goal")
+        for axis in range(3, 6):
+            servo = spec.add_actuator(
+                name=f"{agent}/about_{_AXES[axis - 3]}",
+                trntype=mujoco.mjtTrn.mjTRN_SITE,
+                target=target,
+                refsite=f"{agent}/goal",
+            )
+            servo.set_to_position(kp=own.kp, kv=own.kv)
+            servo.gear = [float(axis == other) for other in range(6)]
+        return
     servo = spec.add_actuator(
         name=f"{agent}/orientation",
         trntype=mujoco.mjtTrn.mjTRN_SITE,
@@ -210,7 +232,6 @@ def _add_servo(spec: mujoco.MjSpec, parameters: ModelParameters, agent: str) -> 
         refsite=reference,
     )
     chart = mujoco.mjtCtrlChart.mjCHART_QUAT
-    own = parameters.of_kind(AxisGains, "orientation") or orientation
     servo.set_to_orientation(kp=own.kp, kv=own.kv, ctrlspec=chart)
 
 

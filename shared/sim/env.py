@@ -16,6 +16,7 @@ from shared.policy.observation import BAT_DIM, ObservationEncoder
 from shared.policy.scripted.sight import Arena
 from shared.sim.batch import FencingBatch
 from shared.sim.model import FencingModel
+from shared.sim.worlds import Worlds
 
 Floats = NDArray[np.float64]
 Float32s = NDArray[np.float32]
@@ -41,11 +42,22 @@ class FencingEnv:
         action: ActionConfig,
         num_envs: int,
         num_threads: int = 1,
+        worlds: Worlds | None = None,
     ) -> None:
+        """Start the bouts.
+
+        Args:
+            model: the scene.
+            rules: of the game.
+            action: bounds of the offsets.
+            num_envs: how many bouts.
+            num_threads: of the physics.
+            worlds: that many worlds of the model; MuJoCo's own, on the processor, if None.
+        """
         self.model = model
         self.rules = rules
         self.num_envs = num_envs
-        self.batch = FencingBatch(model, num_envs, num_threads)
+        self.batch: Worlds = worlds or FencingBatch(model, num_envs, num_threads)
         x, y, z = (float(number) for number in model.target_centre)
         centre = (x, y, z)
         self.scores = Scoreboard(

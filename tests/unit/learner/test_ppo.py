@@ -13,7 +13,7 @@ from tensordict import TensorDict
 
 from services.learner.config import LearnerConfig
 from services.learner.ppo import PolicyOptimiser
-from shared.errors import CheckpointError
+from shared.errors import CheckpointError, ConfigError
 from shared.messages.training import ACTION_DIM, OBS_DIM, Rollout
 from shared.policy.mlp import GaussianPolicy
 from tests.unit.learner.making import SMALL, rollout
@@ -137,7 +137,7 @@ def test_three_updates_of_rsl_rls_own_runner_give_the_same_weights_and_moments(
             obs: Any = obs, rewards: Any = rewards,
         ) -> Any:  # fmt: skip
             recorded.append(as_rollout(obs, rewards, storage))
-            torch.set_rng_state(theirs._random_state)
+            torch.set_rng_state(theirs._random.host)
             return update()
 
         monkeypatch.setattr(runner.alg, "update", with_our_random_state)
@@ -150,7 +150,7 @@ def test_three_updates_of_rsl_rls_own_runner_give_the_same_weights_and_moments(
         stats = ours.update(recorded)
         assert stats.samples == steps * worlds
         assert_same(ours.state(), theirs.state())
-        theirs._random_state = ours._random_state
+        theirs._random.host = ours._random.host
 
 
 def test_act_step_returns_and_update_by_hand_give_the_same_weights():
@@ -173,7 +173,7 @@ def test_act_step_returns_and_update_by_hand_give_the_same_weights():
             )
         algorithm.compute_returns(observations(obs[-1]))
     recorded = as_rollout(obs, rewards, storage)
-    torch.set_rng_state(theirs._random_state)
+    torch.set_rng_state(theirs._random.host)
     losses = algorithm.update()
     stats = ours.update([recorded])
     assert_same(ours.state(), theirs.state())
@@ -311,3 +311,34 @@ def test_a_state_of_another_network_is_refused_by_name():
     del state["random_state"]
     with pytest.raises(CheckpointError, match="random_state"):
         PolicyOptimiser(SMALL, 1).restore(state)
+
+
+def test_a_device_that_is_not_there_is_named_with_those_that_are():
+    if torch.cuda.is_available():
+        pytest.skip("there is a graphics card")
+    with pytest.raises(ConfigError, match=r"learner.device is 'cuda:3'.*here are cpu"):
+        PolicyOptimiser(msgspec.structs.replace(SMALL, device="cuda:3"), seed=1)
+    with pytest.raises(ConfigError, match=r"learner.device is 'gpu'"):
+        PolicyOptimiser(msgspec.structs.replace(SMALL, device="gpu"), seed=1)
+
+
+@pytest.mark.gpu
+def test_an_update_on_a_card_is_the_processors_but_for_rounding_and_resumes_to_the_bit():
+    if not torch.cuda.is_available():
+        pytest.skip("no graphics card, or a torch without CUDA")
+    card = msgspec.structs.replace(SMALL, device="cuda", minibatches=1)
+    host = msgspec.structs.replace(SMALL, minibatches=1)  # one minibatch: no order to draw
+    rollouts = [rollout(3)]
+    ours, theirs = PolicyOptimiser(card, seed=1), PolicyOptimiser(host, seed=1)
+    theirs.restore(ours.state())
+    ours.update(rollouts)
+    theirs.update(rollouts)
+    for one, other in zip(ours.weights().layers, theirs.weights().layers, strict=True):
+        np.testing.assert_allclose(one[0], other[0], atol=1e-4)
+    kept = ours.state()
+    ours.update(rollouts)
+    again = PolicyOptimiser(card, seed=2)
+    again.restore(kept)
+    again.update(rollouts)
+    for name, value in ours.state().items():
+        assert torch.equal(value, again.state()[name]), name
