@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 FEWEST_PEOPLE: Final = 3
 WANTED: Final = 0.8
 """Power that studies are planned for."""
-RESAMPLED: Final = 400
+RESAMPLED: Final = 200
 """Bootstrap draws of people, for what their number leaves open."""
 _CHUNK: Final = 4_000_000
 """Scores drawn at a time."""
