@@ -90,7 +90,8 @@ def main(argv: Sequence[str]) -> int:
         write_session(study, name)
         write_participants(study)
     progress = replay(read_journal(plan.folder))
-    console.print(ending_text(plan, study, progress, name), highlight=False, markup=False)
+    text = ending_text(plan, study, progress, name)
+    console.print(text, highlight=False, markup=False, soft_wrap=True)
     return EXIT_ABORTED if progress.state == "aborted" else code
 
 
@@ -139,6 +140,7 @@ def plan_of(study: Study, found: argparse.Namespace) -> Plan:
         "study.participant": found.participant,
         "study.players": [[name, seat.player] for name, seat in seats.items()],
         "study.port": port,
+        "page.is_led": True,
     }
     argv = [str(site)] if site is not None else []
     argv += ["--protagonist", STATIC, "--out", str(folder)]
