@@ -28,6 +28,8 @@ class PageConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         ("Guard", "scripted:guard"),
     )
     """Protagonists to choose from: a name for people and a player; the first one is chosen."""
+    is_led: bool = False
+    """Whether a study leads: the page names no opponent, and neither arms nor starts anything."""
     max_speed: float = 3.0
     """Of the bat's tip, however fast the mouse is (m/s)."""
     turn_speed: float = 6.0

@@ -82,6 +82,11 @@ class Course:
         self._seen = ("", "")
 
     @property
+    def is_led(self) -> bool:
+        """Return whether a study leads, and nobody is named."""
+        return self._cfg.is_led
+
+    @property
     def sides(self) -> tuple[Agent, ...]:
         """Return the sides that a policy plays."""
         return sides_of(self._cfg)

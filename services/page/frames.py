@@ -55,7 +55,7 @@ def frame(
             "phase": state.phase,
             "reason": state.reason,
             "antagonist": state.antagonist,
-            "protagonist": state.protagonist,
+            "protagonist": "" if course.is_led else state.protagonist,
             "seconds": round(state.seconds, 3),
             "score": state.score,
             "points": state.points,
@@ -83,16 +83,18 @@ def hello(cfg: PageConfig, course: Course, bout_seconds: float, rules: dict[str,
         "pointer": cfg.pointer,
         "is_person": cfg.antagonist == PERSON,
         "antagonist": cfg.antagonist,
-        "players": [name for name, _ in cfg.players],
-        "chosen": course.chosen,
+        "is_led": cfg.is_led,
+        "players": [] if cfg.is_led else [name for name, _ in cfg.players],
+        "chosen": "" if cfg.is_led else course.chosen,
         "bout_seconds": bout_seconds,
         "rules": rules,
     })  # fmt: skip
 
 
 def results(course: Course) -> bytes:
-    """Return the bouts fenced so far, and who is chosen for the next."""
-    return _ENCODER.encode({"type": "results", "results": course.results, "chosen": course.chosen})
+    """Return the bouts fenced so far, and who is next; nothing where a study leads."""
+    fenced, chosen = ([], "") if course.is_led else (course.results, course.chosen)
+    return _ENCODER.encode({"type": "results", "results": fenced, "chosen": chosen})
 
 
 def note(about: str, is_done: bool, lines: list[str]) -> bytes:

@@ -143,7 +143,10 @@ class Page:
         return True
 
     def _do(self, ask: Ask, now: float) -> None:
-        if isinstance(ask, BoutAsk):
+        is_disarm = isinstance(ask, GateAsk) and ask.action == "disarm"
+        if self._cfg.is_led and not isinstance(ask, StatsAsk) and not is_disarm:
+            self._tell("bout", False, ["a study leads: its researcher does that"])
+        elif isinstance(ask, BoutAsk):
             self.course.ask(ask, now)
         elif isinstance(ask, PlayerAsk):
             self.course.choose(ask.name)

@@ -34,6 +34,7 @@ export class Hud {
 
   greet(hello) {
     this.hello = hello;
+    document.body.classList.toggle("led", hello.is_led);
     $("choice").replaceChildren(...hello.players.map((name) => new Option(name, name)));
     $("choice").value = hello.chosen;
     put("who-antagonist", hello.is_person ? "You" : hello.antagonist);
@@ -83,11 +84,11 @@ export class Hud {
     put("penalty", seconds(isNew ? 0 : referee.penalty_steps));
     put("camping", seconds(isNew ? 0 : referee.camping_steps));
     if (referee?.protagonist && isOn) put("who-protagonist", this.opponentName(referee.protagonist));
-    else if (this.hello) put("who-protagonist", $("choice").value);
+    else if (this.hello) put("who-protagonist", this.opponentName(""));
   }
 
   opponentName(reference) {
-    return $("choice").value || reference.slice(0, 16);
+    return $("choice").value || reference.slice(0, 16) || "the robot";
   }
 
   showGate(frame) {
@@ -148,6 +149,10 @@ export class Hud {
     const referee = frame?.referee;
     const left = Math.ceil(frame?.left ?? 0);
     if (!frame || !mode || frame.missing.length) return ["", "…", ""];
+    if (this.hello?.is_led) {
+      const isLost = this.hello.pointer && frame.is_lost;
+      return ["", "", isLost ? "Move the mouse over the scene to take your bat." : ""];
+    }
     if (step === "countdown") return ["", "En garde …", "Your bat may already move."];
     if (mode === "tripped") return ["reset", "Reset the safety stop", `Stopped: ${frame.gate.reason}. Look why before you reset.`];
     if (mode === "disarmed") return ["arm", "Arm the robot", "Arming lets the robot move. It goes slowly at first, and holds still without a bout."];
@@ -167,10 +172,11 @@ export class Hud {
     primary.disabled = action === "";
     primary.dataset.action = action;
     put("primary", label);
-    primary.hidden = action === "pause";
+    const isLed = this.hello?.is_led ?? false;
+    primary.hidden = action === "pause" || isLed;
     put("advice", advice);
-    $("pause").hidden = referee?.phase !== "running";
-    $("abandon").hidden = !(isOn || step === "countdown");
+    $("pause").hidden = referee?.phase !== "running" || isLed;
+    $("abandon").hidden = !(isOn || step === "countdown") || isLed;
     $("choice").disabled = isOn || step === "countdown";
   }
 

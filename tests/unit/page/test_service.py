@@ -286,3 +286,21 @@ def test_the_end_of_the_service_loses_the_bat_and_sends_the_page_away():
         poses.append(pose)
     assert [pose.is_valid for pose in poses] == [False]
     assert site.window.is_closed
+
+
+def test_a_page_that_a_study_leads_names_nobody_and_starts_nothing():
+    site = Paging(is_led=True, players=(("Secret", "scripted:guard"),)).crowd().open().tick(3)
+    hello, results = site.window.notes[:2]
+    assert (hello["is_led"], hello["players"], hello["chosen"]) == (True, [], "")
+    site.wish(START).wish('{"type":"gate","action":"arm"}').wish(
+        '{"type":"player","name":"Secret"}'
+    )
+    assert (site.bouts, site.gate_asked, site.players) == ([], [], [])
+    assert site.notes("bout")[-1]["lines"] == ["a study leads: its researcher does that"]
+    site.referee("running", "theirs")
+    assert site.window.frames[-1]["referee"]["protagonist"] == ""
+    site.referee("finished", "theirs", score=7.0)
+    assert (results["results"], site.window.notes[-1]["results"]) == ([], [])
+    assert "Secret" not in str(site.window.notes) + str(site.window.frames)
+    site.wish('{"type":"gate","action":"disarm"}')  # to stop is everybody's
+    assert site.gate_asked == ["disarm by a person at the page"]
