@@ -14,7 +14,7 @@ def test_no_heart_rate_is_kept_before_the_consent(tmp_path: Path):
     assert stand.session.step.kind == "consent"
     assert read_table(stand.session_folder / "hr.tsv", HeartRateRow) == []
     assert stand.say("consent").is_done
-    stand.tick(3.0)
+    stand.walk("instruction")
     stand.study.close()
     rows = read_table(stand.session_folder / "hr.tsv", HeartRateRow)
     assert {row.step for row in rows} == {"baseline-walking"}
