@@ -44,7 +44,7 @@ PAST: Final = 1e-4
 RECORDER_TICKS: Final = 2
 """Of robot_io's, from one look of the recorder to the next."""
 HOP: Final = 0.09
-"""Longest tick: what must not be silent for 0.1 s, the tracker and the policy, is not (s)."""
+"""Longest tick in which what must not be silent for 0.1 s, tracker and policy, is not (s)."""
 
 
 class Ticking(Protocol):
@@ -128,8 +128,8 @@ class VirtualSite:
 
         Args:
             people: who takes part.
-            seconds: how long the tick is; a period where it is less, ``HOP`` at the most. A longer
-                one leaves ticks of the loop out, for times in which nothing has to be judged.
+            seconds: how long the tick is, at least a period. A longer one leaves ticks of the loop
+                out, for times in which nothing has to be judged; one over ``HOP`` loses the bat.
         """
         self.robot_io.tick()
         if self.policy is not None:
@@ -143,7 +143,7 @@ class VirtualSite:
         self.robot_io.tick()
         if self._ticks % RECORDER_TICKS == 0:
             self.recorder.tick()
-        self.clock.advance(min(max(seconds, self._period), HOP) - answered)
+        self.clock.advance(max(seconds, self._period) - answered)
         self._ticks += 1
 
     def ask(self, bus: Bus, action: Literal["arm", "disarm"]) -> GateReply:

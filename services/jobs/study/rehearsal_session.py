@@ -41,6 +41,8 @@ FIRST_DAY: Final = datetime.datetime(2026, 1, 5, 9, 0, tzinfo=datetime.UTC)
 """When the first simulated person comes; a day later comes the next one. Nobody came."""
 LONGEST: Final = 4 * 3600.0
 """Of a session (s); one that goes on for longer has got stuck."""
+LEAP: Final = 0.5
+"""A tick while a heart rate is measured and the robot cannot move: nobody needs the bat (s)."""
 SETTLING: Final = 1.0
 """After a bout and before one, for which no ticks are left out (s)."""
 
@@ -96,7 +98,8 @@ class Rehearsal:
         if self._is_busy():
             self._busy_at = now
         is_short = now - self._busy_at < SETTLING
-        self.site.tick(self.person, self.study, self.desk, seconds=0.0 if is_short else HOP)
+        seconds = 0.0 if is_short else LEAP if self._is_at_rest() else HOP
+        self.site.tick(self.person, self.study, self.desk, seconds=seconds)
 
     def run(self) -> None:
         """Walk the whole session.
@@ -121,6 +124,12 @@ class Rehearsal:
         kind = step.kind if step is not None else ""
         self.person.is_walking = kind == "baseline" and step is not None and "walk" in step.id
         self.person.is_sitting = kind not in ("warm_up", "game", "rest", "explore")
+
+    def _is_at_rest(self) -> bool:
+        session = self.session
+        is_measuring = session.step is not None and session.step.kind == "baseline"
+        is_timed = session.moment.stage == "timer"
+        return is_measuring and is_timed and session.heard.mode == "disarmed"
 
     def _is_busy(self) -> bool:
         moment = self.session.moment
