@@ -178,13 +178,8 @@ class Session:
         self.plan.check(self.progress)
         self.write(self.plan.resumed)
         if (running := self.progress.running) is not None:
-            step, attempt = running
-            start = attempt.start
-            ended = GameEnded(
-                attempt=start.attempt, bout=start.bout, policy=start.policy, outcome="void",
-                reason=KILLED, archive=f"bouts/{start.bout}",
-            )  # fmt: skip
-            self.write(ended, step)
+            game = next(step for step in self.plan.steps if step.id == running[0])
+            self.write(game_ended(self, game, "void", KILLED, None), game.id)
             self.moment = replace(self.moment, trouble=KILLED)
         self.moment = replace(self.moment, is_paused=self.progress.is_paused)
         step = self.step
