@@ -12,6 +12,11 @@ const TAKEN_OVER = 4001;
 const TOO_MANY = 4009;
 const STATES = { [TAKEN_OVER]: "taken", [TOO_MANY]: "many" };
 
+/** Return JSON; half a character, as a cut emoji leaves it, is left out, for it is none. */
+function written(ask) {
+  return JSON.stringify(ask, (_, value) => (typeof value === "string" ? value.replace(/\p{Surrogate}/gu, "") : value));
+}
+
 function newId() {
   return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
@@ -134,7 +139,7 @@ export class Link {
   }
 
   send(ask) {
-    if (this.isOpen) this.socket.send(JSON.stringify(ask));
+    if (this.isOpen) this.socket.send(written(ask));
   }
 
   keep() {

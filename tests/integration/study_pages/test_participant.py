@@ -130,6 +130,19 @@ def test_what_another_person_typed_is_not_shown_and_not_sent(opened: Opener, run
     assert runner.asked == []
 
 
+def test_half_an_emoji_does_not_hold_up_an_answer(opened: Opener, runner: Runner):
+    visit = opened().shows(form(points("PU", is_required=False), OPEN))
+    visit.page.evaluate(
+        """() => {
+          const area = document.querySelector("textarea");
+          area.value = "fun \\u{1F600}" + "\\u{1F600}".slice(0, 1);
+          area.dispatchEvent(new Event("input"));
+        }"""
+    )
+    visit.page.click("text=Send answers")
+    assert runner.said().answers[1].text == "fun \N{GRINNING FACE}"
+
+
 def test_a_questionnaire_is_filled_in_with_the_keyboard_alone(opened: Opener, runner: Runner):
     visit = opened().shows(form(points("A"), points("B"), OPEN))
     keys = visit.page.keyboard
