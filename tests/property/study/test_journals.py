@@ -65,7 +65,7 @@ def written(folder, whats):
         return journal.events
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.lists(st.tuples(events, names), max_size=4))
 def test_a_journal_cut_at_any_byte_holds_the_events_before_it_and_goes_on(whats):
     with tempfile.TemporaryDirectory() as name:
@@ -80,7 +80,7 @@ def test_a_journal_cut_at_any_byte_holds_the_events_before_it_and_goes_on(whats)
         replay(found)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.integers(0, 10_000), st.integers(1, 3))
 def test_whoever_goes_on_after_a_cut_loses_and_doubles_nothing(cut, more):
     with tempfile.TemporaryDirectory() as name:
@@ -101,7 +101,7 @@ def test_whoever_goes_on_after_a_cut_loses_and_doubles_nothing(cut, more):
         assert [event.number for event in after] == list(range(1, len(after) + 1))
 
 
-@settings(max_examples=50)
+@settings(max_examples=20)
 @given(st.lists(st.tuples(events, names), max_size=12), st.integers(0, 12))
 def test_progress_is_the_same_whether_events_come_one_by_one_or_all_at_once(whats, begin):
     whole = [(BEGAN, ""), *whats[:begin], *GAME, *whats[begin:], (Aborted(reason="x"), "")]
@@ -126,14 +126,15 @@ rows = st.builds(
 )  # fmt: skip
 
 
-@given(st.lists(rows, max_size=4))
+@settings(max_examples=25)
+@given(st.lists(rows, max_size=3))
 def test_a_table_comes_back_as_it_was_written(made):
     data = encode_table(made, QuestionnaireRow)
     assert decode_table(data, "t", QuestionnaireRow) == made
     assert data.count(b"\n") == len(made) + 1
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.lists(rows, min_size=1, max_size=3), st.integers(0, 100_000), rows)
 def test_a_growing_table_cut_at_any_byte_keeps_its_whole_rows_and_goes_on(made, cut, last):
     with tempfile.TemporaryDirectory() as name:
