@@ -101,7 +101,7 @@ def test_whoever_goes_on_after_a_cut_loses_and_doubles_nothing(cut, more):
         assert [event.number for event in after] == list(range(1, len(after) + 1))
 
 
-@settings(max_examples=20)
+@settings(max_examples=20, deadline=None)
 @given(st.lists(st.tuples(events, names), max_size=12), st.integers(0, 12))
 def test_progress_is_the_same_whether_events_come_one_by_one_or_all_at_once(whats, begin):
     whole = [(BEGAN, ""), *whats[:begin], *GAME, *whats[begin:], (Aborted(reason="x"), "")]
@@ -126,7 +126,7 @@ rows = st.builds(
 )  # fmt: skip
 
 
-@settings(max_examples=25)
+@settings(max_examples=25, deadline=None)
 @given(st.lists(rows, max_size=3))
 def test_a_table_comes_back_as_it_was_written(made):
     data = encode_table(made, QuestionnaireRow)

@@ -43,7 +43,7 @@ def check_balance(orders, n):
     assert len(set(pairs.values())) == 1
 
 
-@settings(max_examples=25)
+@settings(max_examples=25, deadline=None)
 @given(st.integers(2, 12))
 def test_a_williams_design_is_balanced_on_places_and_on_neighbours(n):
     rows = williams(n)
@@ -51,7 +51,7 @@ def test_a_williams_design_is_balanced_on_places_and_on_neighbours(n):
     check_balance(rows, n)
 
 
-@settings(max_examples=20)
+@settings(max_examples=20, deadline=None)
 @given(protocols(kinds=("williams",)), st.integers(1, 3), st.integers(0, 2**31))
 def test_whole_blocks_of_people_are_balanced(protocol, blocks, seed):
     made = allocate(protocol, blocks * block_size(protocol), seed)
@@ -60,7 +60,7 @@ def test_whole_blocks_of_people_are_balanced(protocol, blocks, seed):
     check_balance(free, len(protocol.condition) - first)
 
 
-@settings(max_examples=20)
+@settings(max_examples=20, deadline=None)
 @given(protocols(), st.integers(1, 40), st.integers(0, 2**31))
 def test_everybody_meets_each_condition_once_and_the_first_ones_first(protocol, people, seed):
     made = allocate(protocol, people, seed)
@@ -73,7 +73,7 @@ def test_everybody_meets_each_condition_once_and_the_first_ones_first(protocol, 
         assert tuple(met[: len(protocol.order.first)]) == protocol.order.first
 
 
-@settings(max_examples=20)
+@settings(max_examples=20, deadline=None)
 @given(protocols(), st.integers(1, 30), st.integers(0, 30), st.integers(0, 2**31))
 def test_a_seed_says_it_all_and_more_people_change_no_ones_order(protocol, people, more, seed):
     made = allocate(protocol, people, seed)
