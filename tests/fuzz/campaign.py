@@ -13,8 +13,9 @@ from pathlib import Path
 import msgspec
 
 from shared.runtime.files import atomic_write
+from tests.fuzz.order import Engine, Order
 from tests.fuzz.registry import targets_of
-from tests.fuzz.worker import Box, Fault, Order, Result, Tally
+from tests.fuzz.worker import Box, Fault, Result, Tally
 
 HANG_SECONDS = 60.0
 """Wall clock without a new input, after which a child hangs; this machine may be busy."""
@@ -42,7 +43,7 @@ class Plan:
     inputs: int
     seed: int
     folder: Path
-    engine: str = "mutate"
+    engine: Engine = "mutate"
     chunk: int = 20_000
     """Inputs of one child."""
     only: str = ""
@@ -76,7 +77,7 @@ def run(plan: Plan, say: Callable[[str], None] = print) -> Progress:
 
 def _chunk(plan: Plan, progress: Progress) -> None:
     """Let one child read, and add what it found."""
-    box, result = (plan.folder / f"{plan.name}.{end}" for end in ("box", "result"))
+    box, result = (plan.folder.resolve() / f"{plan.name}.{end}" for end in ("box", "result"))
     result.unlink(missing_ok=True)
     order = Order(
         group=plan.group, only=plan.only, engine=plan.engine, seed=plan.seed, first=progress.done,
@@ -141,6 +142,18 @@ def _sum(one: Tally, other: Tally) -> Tally:
         seconds=max(one.seconds, other.seconds),
         memory=max(one.memory, other.memory),
     )
+
+
+def both(one: Progress, other: Progress) -> Progress:
+    """Return the sum of two campaigns."""
+    tallies = dict(one.tallies)
+    for name, tally in other.tallies.items():
+        tallies[name] = _sum(tallies.get(name, Tally()), tally)
+    return Progress(
+        done=one.done + other.done, seconds=one.seconds + other.seconds, tallies=tallies,
+        faults=one.faults + other.faults, crashes=one.crashes + other.crashes,
+        hangs=one.hangs + other.hangs,
+    )  # fmt: skip
 
 
 def save_faults(progress: Progress, folder: Path) -> list[Path]:

@@ -41,6 +41,9 @@ class Target:
     covers: tuple[str, ...]
     """``module:qualname`` of the functions that meet the bytes; a test looks whether they do."""
     bound: Bound = Bound(64, 32 * MIB)
+    may_run_out: bool = False
+    """Whether it may be refused because memory was asked for that is not there: somebody else's
+    reader takes a length at its word before it looks for the bytes. What is taken is bounded."""
     weight: int = 1
     """Inputs of this target for one of another target of its group."""
 

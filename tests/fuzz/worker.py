@@ -6,6 +6,7 @@ parent's patience, the input is known.
 """
 
 import mmap
+import os
 import resource
 import struct
 import sys
@@ -18,7 +19,8 @@ from pathlib import Path
 import msgspec
 import structlog
 
-from tests.fuzz import guard
+from tests.fuzz import guard, with_hypothesis
+from tests.fuzz.order import Order
 from tests.fuzz.registry import targets_of
 from tests.fuzz.target import MIB, Target
 
@@ -30,22 +32,6 @@ BOX = struct.Struct("<QIQ")
 BOX_BYTES = 8 * MIB
 SLOW_SECONDS = 2.0
 """CPU seconds of one input; more is a defect."""
-
-
-class Order(msgspec.Struct, frozen=True, kw_only=True):
-    """What a child is to do."""
-
-    group: str
-    only: str = ""
-    """Name of a target; empty: all of the group."""
-    engine: str = "mutate"
-    seed: int
-    first: int
-    """Of the inputs of the whole group."""
-    count: int
-    box: str
-    result: str
-    registry: str = "tests.fuzz.registry"
 
 
 class Fault(msgspec.Struct, frozen=True, kw_only=True):
@@ -120,7 +106,7 @@ class Reader:
                 target.read(data)
             tally.accepted += 1
         except target.refusals as error:
-            if _ran_out(error):
+            if _ran_out(error) and not target.may_run_out:
                 self._fault(which, index, "memory", f"refused for lack of memory: {error}", data)
         except BaseException as error:
             if isinstance(error, KeyboardInterrupt):
@@ -136,6 +122,10 @@ class Reader:
         if self._watch.events:
             self._fault(which, index, "acted", "; ".join(self._watch.events), data)
             self._watch.events.clear()
+
+    def one(self, which: int, data: bytes, first: int) -> None:
+        """Read one input, the next after ``first`` and those that were read."""
+        self.batch([(which, first + self.result.done, data)])
 
     def batch(self, inputs: list[tuple[int, int, bytes]]) -> None:
         """Read some, and look what memory they took; in doubt one by one."""
@@ -219,6 +209,7 @@ def main(words: list[str]) -> int:
     warnings.simplefilter("ignore")
     ram = Path("/dev/shm")
     with tempfile.TemporaryDirectory(dir=ram if ram.is_dir() else None) as name:
+        os.chdir(name)  # where libraries write logs that nobody asked for
         watch = guard.Guard(Path(name))
         targets = _targets(order, Path(name))
         reader = Reader(targets, watch, Box(Path(order.box)))
@@ -230,6 +221,8 @@ def main(words: list[str]) -> int:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         if order.engine == "atheris":
             _guided(reader, order)
+        elif order.engine == "hypothesis":
+            with_hypothesis.run(reader.targets, reader.one, order)
         else:
             batch: list[tuple[int, int, bytes]] = []
             for each in inputs(targets, order):
@@ -248,7 +241,7 @@ def _guided(reader: Reader, order: Order) -> None:
     from tests.fuzz import with_atheris
 
     def read(data: bytes) -> None:
-        reader.batch([(0, order.first + reader.result.done, data)])
+        reader.one(0, data, order.first)
         if reader.result.done >= order.count:
             write(reader, order)
             with_atheris.leave(0)
