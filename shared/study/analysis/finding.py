@@ -11,6 +11,7 @@ ALPHA = 0.05
 """Below this p counts as significant, and an assumption as violated."""
 CONFIDENCE = 0.95
 """Of every interval."""
+ONE = {"people": "person"}
 
 
 class Estimate(msgspec.Struct, frozen=True, kw_only=True):
@@ -99,4 +100,5 @@ def check(assumption: str, test: str, statistic: float, p: float) -> Check:
 
 def missing_text(count: int, what: str, why: str) -> tuple[str, ...]:
     """Return one line about what was left out, none where nothing was."""
-    return (f"{count} {what} left out: {why}",) if count else ()
+    words = ONE.get(what, what.removesuffix("s")) if count == 1 else what
+    return (f"{count} {words} left out: {why}",) if count else ()

@@ -8,7 +8,6 @@ A paired test is a one-sample test of the differences, and is done as one.
 
 import dataclasses
 import itertools
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -96,6 +95,8 @@ def one_sample(values: Floats, named: Named) -> Finding:
 def signed_rank(values: Floats, named: Named) -> Finding:
     """Return Wilcoxon's signed-rank test against zero; zeros are dropped, as he did.
 
+    p is exact, given which values tie: every pattern of signs is counted.
+
     Args:
         values: float64[n], finite.
         named: what it is called.
@@ -104,9 +105,11 @@ def signed_rank(values: Floats, named: Named) -> Finding:
     moved = values[values != 0.0]
     if not len(moved):
         return not_done(named.question, test, len(values), "all are zero", unit=named.unit)
-    found: Any = stats.wilcoxon(moved)
-    ranks = stats.rankdata(np.abs(moved))
-    signed = float(np.sum(ranks * np.sign(moved)) / np.sum(ranks))
+    ranks: Any = stats.rankdata(np.abs(moved))
+    above, total = float(ranks[moved > 0.0].sum()), float(ranks.sum())
+    smaller = min(above, total - above)
+    chances = _rank_sum_chances(np.rint(2.0 * ranks).astype(np.int64))
+    p = min(1.0, 2.0 * float(chances[: round(2.0 * smaller) + 1].sum()))
     zeros = len(values) - len(moved)
     return Finding(
         question=named.question,
@@ -114,10 +117,10 @@ def signed_rank(values: Floats, named: Named) -> Finding:
         n=len(values),
         unit=named.unit,
         symbol="W",
-        statistic=float(found.statistic),
-        p=float(found.pvalue),
+        statistic=smaller,
+        p=p,
         estimate=hodges_lehmann(values),
-        effect=Estimate(name="rank-biserial r", value=signed),
+        effect=Estimate(name="rank-biserial r", value=(2.0 * above - total) / total),
         left_out=missing_text(zeros, "zeros", "they have no sign"),
     )
 
@@ -133,7 +136,9 @@ def hodges_lehmann(values: Floats) -> Estimate:
     n = len(values)
     rows, columns = np.triu_indices(n)
     walsh = np.sort((values[rows] + values[columns]) / 2.0)
-    below = int(np.searchsorted(np.cumsum(_rank_sum_weights(n)), TAIL, side="right"))
+    below = int(
+        np.searchsorted(np.cumsum(_rank_sum_chances(np.arange(1, n + 1))), TAIL, side="right")
+    )
     method = "signed ranks"
     value = float(np.median(walsh))
     if below == 0:  # even the whole range is no 95 % interval
@@ -185,13 +190,12 @@ def _is_constant(values: Floats) -> bool:
     return float(np.ptp(values)) <= NOTHING_VARIES * max(1.0, float(np.max(np.abs(values))))
 
 
-def _rank_sum_weights(n: int) -> Floats:
-    """Return float64[n (n + 1) / 2 + 1], the null chance of each sum of positive ranks."""
-    weights = np.ones(1)
-    for rank in range(1, n + 1):
-        grown = np.zeros(len(weights) + rank)
-        grown[: len(weights)] += weights
-        grown[rank:] += weights
-        weights = grown / 2.0
-    assert math.isclose(float(weights.sum()), 1.0)
-    return weights
+def _rank_sum_chances(ranks: NDArray[np.int64]) -> Floats:
+    """Return float64[sum + 1], the null chance of each sum of the ranks with a plus sign."""
+    chances = np.ones(1)
+    for rank in ranks.tolist():
+        grown = np.zeros(len(chances) + rank)
+        grown[: len(chances)] += chances
+        grown[rank:] += chances
+        chances = grown / 2.0
+    return chances

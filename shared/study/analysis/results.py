@@ -40,7 +40,7 @@ class ChapterResults(msgspec.Struct, frozen=True, kw_only=True):
     key: str
     title: str
     says: tuple[str, ...]
-    headlines: int
+    headlines: int = 1
     """How many of them stand in the summary."""
     findings: tuple[Finding, ...]
     tables: tuple[Table, ...]

@@ -83,9 +83,18 @@ def test_the_signed_rank_test_counts_all_patterns_of_signs():
     sums = [sum(itertools.compress(ranks, signs)) for signs in itertools.product((0, 1), repeat=7)]
     p = min(1.0, 2.0 * np.mean(np.array(sums) <= smaller))
     found = signed_rank(values, NAMED)
+    assert found.p == pytest.approx(stats.wilcoxon(values).pvalue)
     assert found.statistic == smaller
     assert found.p == pytest.approx(p)
     assert found.effect.value == pytest.approx(1.0 - 2.0 * smaller / ranks.sum())
+
+
+def test_the_signed_rank_test_is_exact_where_values_tie():
+    values = np.array([1.0, 1.0, -1.0, 2.0, 0.0, 3.0, 3.0, -2.0])
+    patterns = stats.PermutationMethod(n_resamples=1000)
+    found = signed_rank(values, NAMED)
+    assert found.p == pytest.approx(stats.wilcoxon(values[values != 0.0], method=patterns).pvalue)
+    assert found.left_out == ("1 zero left out: they have no sign",)
 
 
 def test_the_interval_of_the_signed_rank_test_ends_where_its_p_passes_a_twentieth():
@@ -173,7 +182,7 @@ def test_a_person_who_misses_a_level_is_left_out_of_the_anova():
     found = repeated_anova(cube, "levels", np.random.default_rng(0))
     whole = repeated_anova(np.delete(cube, 2, axis=0), "levels", np.random.default_rng(0))
     assert (found.n, found.statistic) == (5, whole.statistic)
-    assert found.left_out == ("1 people left out: not every level was measured",)
+    assert found.left_out == ("1 person left out: not every level was measured",)
 
 
 def test_the_pooled_line_solves_the_normal_equations():
@@ -188,7 +197,7 @@ def test_the_pooled_line_solves_the_normal_equations():
     error = np.sqrt(inverse[1, 1] * left @ left / (len(x) - 2))
     found = pooled(GAMES, cube, "learning")
     assert found.n == 99
-    assert found.left_out == ("1 games left out: no score",)
+    assert found.left_out == ("1 game left out: no score",)
     assert found.estimate.value == pytest.approx(b)
     assert found.statistic == pytest.approx(b / error)
     assert found.effect.value == pytest.approx(np.corrcoef(x, y)[0, 1])
