@@ -177,6 +177,11 @@ class Gate:
             return memory, reasons
         return GateMemory(reason="reset after a trip", commanded_at=memory.commanded_at), ()
 
+    def is_astray(self, memory: GateMemory, inputs: GateInputs) -> bool:
+        """Return whether a disarmed robot stands where it cannot be armed, whoever asks."""
+        is_shut = memory.mode == "disarmed" and is_pose(inputs.measured)
+        return is_shut and not self.space.allows(inputs.measured)
+
     def obstacles(self, memory: GateMemory, inputs: GateInputs) -> tuple[str, ...]:
         """Return everything that stands in the way of arming."""
         return _problems(self.checks(memory, inputs))

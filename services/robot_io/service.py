@@ -56,7 +56,8 @@ class Parts(msgspec.Struct, frozen=True, kw_only=True):
     person: PersonBat | None = None
     """The scene that a person's bat is put into."""
     put_back: Callable[[], None] | None = None
-    """Puts a simulated robot's arm en garde after a reset, as people do a real one by hand."""
+    """Puts a simulated robot's arm en garde, as people do a real one by hand: after a reset, and
+    where it cannot be armed as it stands."""
     extras: Extras = Extras()
     """What runs beside the loop."""
 
@@ -318,6 +319,9 @@ class RobotIo:
         reasons: tuple[str, ...] = ()
         if asked.action == "arm":
             self._memory, reasons = self._parts.gate.arm(before, inputs)
+            if self._parts.put_back is not None and self._parts.gate.is_astray(before, inputs):
+                self._parts.put_back()
+                reasons = ("the simulated arm stood outside its space and is en garde: arm again",)
         elif asked.action == "reset":
             self._memory, reasons = self._parts.gate.reset(before, inputs)
             if not reasons and self._parts.put_back is not None:

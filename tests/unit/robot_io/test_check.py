@@ -2,9 +2,14 @@
 
 import math
 
+import msgspec
 import numpy as np
 
+from services.robot_io.limits import Space
 from services.robot_io.poses import Pose
+from services.robot_io.scene import blade_of
+from shared.sim.config import SimConfig
+from shared.sim.model import FencingModel
 from tests.unit.robot_io.gates import START, Driven
 from tests.unit.robot_io.looping import Looping
 
@@ -80,5 +85,27 @@ def test_a_reset_puts_a_simulated_arm_back_where_it_may_be_armed():
     loop.tick(2)
     assert loop.ask("reset").mode == "disarmed"
     loop.tick(3)
+    assert np.linalg.norm(loop.tool[:3] - home) < 0.01
+    assert loop.ask("arm").accepted
+
+
+def test_a_simulated_arm_that_was_shut_outside_its_space_is_put_back_when_a_person_arms():
+    loop = Looping().armed()
+    home = loop.tool[:3].copy()
+    loop.offset = np.array([0.0375, 0.0, 0.0, 0.0, 0.0, 0.0])
+    loop.tick(300)
+    assert loop.ask("disarm").mode == "disarmed"
+    gate = loop.parts.gate
+    edge = float(loop.tool[0]) - 0.001  # as if it had swung a millimetre too far
+    smaller = msgspec.structs.replace(gate.cfg, box_high=(edge, *gate.cfg.box_high[1:]))
+    gate.space = Space(smaller, blade_of(FencingModel.build(SimConfig())))
+    loop.tick(20)
+    refused = loop.ask("arm")
+    assert not refused.accepted
+    assert refused.reasons == (
+        "the simulated arm stood outside its space and is en garde: arm again",
+    )
+    loop.offset = np.zeros(6)
+    loop.tick(5)
     assert np.linalg.norm(loop.tool[:3] - home) < 0.01
     assert loop.ask("arm").accepted
