@@ -31,9 +31,10 @@ SETTINGS = (
     "play.record=false", "play.rest=0.0", "safety.ramp=0.5", "safety.command_hold=0.5",
     "safety.command_trip=1.0", "safety.tracker_hold=0.5", "safety.state_hold=0.5",
     "policy.stale_after=1.0", "policy.referee_silence=2.0", "robot_io.referee_silence=2.0",
-    "referee.stale_after=1.0", "referee.void_after=10.0",
+    "referee.stale_after=1.0", "referee.void_after=10.0", "game.bout_steps=200",
 )  # fmt: skip
-"""Patience for a machine that does more than this."""
+"""Patience for a machine that does more than this; and bouts so short that some come to an end
+between two faults, for a match gives up after twenty in a row that did not."""
 PLAYERS = ("--antagonist", "scripted:slash", "--protagonist", "heuristic")
 EVERYBODY = ("router-0", "robot-io-0", "policy-antagonist", "policy-protagonist", "referee-0")
 SHUT = ("disarmed", "tripped")
