@@ -8,12 +8,13 @@ import pytest
 from services.jobs.play.plan import Plan
 from services.jobs.play.processes import processes
 from services.jobs.study.hosting import StudyHost
-from services.jobs.study.run import parse, plan_of, progress_of
+from services.jobs.study.run import main, parse, plan_of, progress_of
 from services.study.config import StudyConfig
 from shared.bus.ports import free_port
 from shared.clock import ManualClock
 from shared.config.site import load_section
-from shared.errors import ConfigError, SnapshotError, StudyError
+from shared.errors import ConfigError, RiposteError, SnapshotError, StudyError
+from shared.runtime.files import RunLock
 from shared.study.drawing import draw_orders
 from shared.study.events import SessionBegan, SessionEnded
 from shared.study.folder import Study, make_study
@@ -107,3 +108,13 @@ def test_a_port_that_was_asked_for_and_is_taken_is_refused(tmp_path: Path):
         port = taken.getsockname()[1]
         with pytest.raises(ConfigError, match=rf"study.port: {port} is in use"):
             planned(study, "--port", str(port))
+
+
+def test_a_session_that_runs_elsewhere_is_not_run_again(tmp_path: Path):
+    study = study_in(tmp_path / "study")
+    folder = study.session_folder("sub-01")
+    words = [str(study.folder), "--participant", "sub-01", "--antagonist", "scripted:stab"]
+    with RunLock(folder / "logs"), pytest.raises(RiposteError, match="in use by process"):
+        main(words)
+    assert not (folder / "journal.jsonl").exists()
+    assert not (folder / "config.toml").exists()
