@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 
 from services.jobs.study.analyse import main
+from shared.errors import RiposteError
 from shared.study.analysis.chapters.acceptance import acceptance_chapter
 from shared.study.analysis.chapters.answers import answers_chapter
 from shared.study.analysis.chapters.heart_rate import heart_rate_chapter
 from shared.study.analysis.chapters.rankings import rankings_chapter
 from shared.study.analysis.games import games_of
-from shared.study.analysis.results import Results
+from shared.study.analysis.results import Results, analyse_folder
 from shared.study.tables import load_study
+from tests.unit.study.made import play, study_in
 from tests.unit.study_analysis.made import Person, line_scores, write_study
 
 TABLE_1 = {
@@ -30,15 +32,6 @@ RAISED, RESTFUL = 93, 24
 """Of 320 games: peak 20 % above walking or more (29 %), at most walking (7.4 %)."""
 LINES = {"baseline": (30.0, 0.5648, 383.5), "rl": (15.7, 0.3419, 349.1)}
 """Slope, r and mean score of study two, 10 people, 10 games; r to the digits that give its p."""
-
-
-def read(folder):
-    return msgspec.json.decode((folder / "results.json").read_bytes(), type=Results)
-
-
-def table(folder, name):
-    with (folder / f"{name}.csv").open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 @pytest.fixture(scope="module")
@@ -100,8 +93,19 @@ def study_two(tmp_path_factory):
         )  # fmt: skip
 
     write_study(folder, "study-two", 10, make)
-    assert main([str(folder), "--unblind", "--out", str(folder / "out")]) == 0
-    return folder / "out"
+    return folder
+
+
+@pytest.fixture(scope="module")
+def results(study_two):
+    return analyse_folder(study_two, load_study(study_two, unblind=True)).results
+
+
+@pytest.fixture(scope="module")
+def written(study_two):
+    """The files of the command."""
+    assert main([str(study_two), "--unblind", "--out", str(study_two / "out")]) == 0
+    return study_two / "out"
 
 
 def rows_of(chapter, name):
@@ -151,49 +155,61 @@ def test_adjectives_are_counted_by_condition(study_one):
 
 @pytest.mark.parametrize(
     ("condition", "slope", "r", "p", "mean"),
-    [("baseline", "30.0", "0.56", "9.3e-10", 383.5), ("rl", "15.7", "0.34", "0.0005", 349.1)],
+    [("baseline", 30.0, 0.56, "9.3e-10", 383.5), ("rl", 15.7, 0.34, "0.0005", 349.1)],
 )
-def test_the_papers_regression_of_study_two_comes_back(study_two, condition, slope, r, p, mean):
-    row = next(row for row in table(study_two, "regression") if row["condition"] == condition)
-    assert (row["games"], row["slope"], row["r"]) == ("100", slope, r)
-    assert f"{float(row['p']):.{1 if 'e' in p else 4}{'e' if 'e' in p else 'f'}}" == p
-    scores = next(row for row in table(study_two, "scores") if row["condition"] == condition)
-    assert float(scores["mean"]) == mean
+def test_the_papers_regression_of_study_two_comes_back(results, condition, slope, r, p, mean):
+    rows = rows_of(results.chapter("learning"), "regression")
+    row = next(row for row in rows if row["condition"] == condition)
+    assert (row["games"], row["slope"], row["r"]) == (100, slope, r)
+    assert f"{row['p']:.{1 if 'e' in p else 4}{'e' if 'e' in p else 'f'}}" == p
+    rows = rows_of(results.chapter("scores"), "scores")
+    assert next(row for row in rows if row["condition"] == condition)["mean"] == mean
 
 
-def test_seventy_percent_found_rl_more_intelligent(study_two):
-    chapter = read(study_two).chapter("answers")
+def test_the_slopes_of_people_are_compared(results):
+    findings = results.chapter("learning").findings
+    found = next(f for f in findings if f.test == "paired t-test of slopes")
+    assert found.question == "slope: baseline - rl"
+    assert found.estimate.value == pytest.approx(14.3)
+    model = next(f for f in findings if f.test.startswith("mixed model"))
+    assert model.p is None or model.estimate.value == pytest.approx(14.3, rel=1e-3)
+
+
+def test_seventy_percent_found_rl_more_intelligent(results):
+    chapter = results.chapter("answers")
     found = next(f for f in chapter.findings if f.question == "more intelligent")
     assert (found.n, found.estimate.name, found.estimate.value) == (10, "chose rl", 0.7)
-    rows = table(study_two, "choice_Q4")
-    assert [(row["condition"], row["people"]) for row in rows] == [
-        ("rl", "7"), ("baseline", "2"), ("equally", "1"),
-    ]  # fmt: skip
+    people = {row["condition"]: row["people"] for row in rows_of(chapter, "choice_Q4")}
+    assert people == {"rl": 7, "baseline": 2, "equally": 1}
 
 
-def test_table_3_is_paired_and_says_where_nothing_differs(study_two):
-    rows = {row["construct"]: row for row in table(study_two, "tam_comparison")}
-    assert (rows["PU"]["t"], rows["PU"]["p"]) == ("", "")
+def test_table_3_is_paired_and_says_where_nothing_differs(results):
+    compared = rows_of(results.chapter("acceptance"), "tam_comparison")
+    rows = {row["construct"]: row for row in compared}
+    assert (rows["PU"]["t"], rows["PU"]["p"]) == (None, None)
     first = np.array([(3, 4, 5, 3)[k % 4] for k in range(10)])
     second = np.array([(4, 4, 3, 5)[k % 4] for k in range(10)])
     difference = first - second
     t = difference.mean() / (difference.std(ddof=1) / np.sqrt(10))
-    assert float(rows["PEOU"]["t"]) == pytest.approx(t, abs=0.005)
-    assert float(rows["PEOU"]["median baseline"]) == 3.5
-    findings = read(study_two).chapter("acceptance").findings
+    assert rows["PEOU"]["t"] == pytest.approx(t, abs=0.005)
+    assert rows["PEOU"]["median baseline"] == 3.5
+    findings = results.chapter("acceptance").findings
     assert next(f for f in findings if f.question.startswith("PU")).note == "not done: all are zero"
     assert next(f for f in findings if f.question.startswith("ATT")).n == 0
 
 
-def test_what_people_wrote_is_neither_html_nor_a_formula(study_two):
-    page = (study_two / "report.html").read_text()
+@pytest.mark.slow
+def test_what_people_wrote_is_neither_html_nor_a_formula(written):
+    page = (written / "report.html").read_text()
     assert "<b>defensive</b>" not in page
     assert "&lt;b&gt;defensive" in page
-    assert table(study_two, "words")[0]["answer"].startswith("'=cmd")
+    with (written / "words.csv").open(newline="") as file:
+        assert next(csv.DictReader(file))["answer"].startswith("'=cmd")
 
 
-def test_the_report_asks_nobody_for_anything(study_two):
-    page = (study_two / "report.html").read_text()
+@pytest.mark.slow
+def test_the_report_asks_nobody_for_anything(written):
+    page = (written / "report.html").read_text()
     assert "default-src &#x27;none&#x27;" in page
     assert page.count("<svg") == 4
     for way_out in ("<script", 'src="http', 'href="http', "url(http", "@import"):
@@ -202,7 +218,29 @@ def test_the_report_asks_nobody_for_anything(study_two):
 
 
 @pytest.mark.slow
-def test_the_results_are_the_same_again(study_two, tmp_path):
-    main([str(study_two.parent), "--unblind", "--out", str(tmp_path)])
+def test_the_results_are_the_same_again(written, tmp_path, results):
+    main([str(written.parent), "--unblind", "--out", str(tmp_path)])
     for name in ("results.json", "report.html", "tests.csv"):
-        assert (tmp_path / name).read_bytes() == (study_two / name).read_bytes()
+        assert (tmp_path / name).read_bytes() == (written / name).read_bytes()
+    found = msgspec.json.decode((written / "results.json").read_bytes(), type=Results)
+    assert found == results
+
+
+@pytest.mark.slow
+def test_a_study_of_which_only_one_person_has_played_is_analysed(tmp_path):
+    study = study_in(tmp_path / "s", "study-one", people=4)
+    play(study, "sub-02", is_repeated="s2-g01")
+    assert main([str(study.folder)]) == 0
+    found = msgspec.json.decode(
+        (study.folder / "analysis" / "results.json").read_bytes(), type=Results
+    )
+    assert found.is_blinded
+    assert found.chapter("people").says[0].startswith("1 of 16 planned people")
+    assert "1 attempt left out: void, repeated or not ended" in found.chapter("people").says
+    assert all(f.p is None for f in found.chapter("scores").findings)
+
+
+def test_a_study_of_which_nobody_has_played_is_refused(tmp_path):
+    study = study_in(tmp_path / "s", "study-two", people=4)
+    with pytest.raises(RiposteError, match="nobody has taken part"):
+        main([str(study.folder)])

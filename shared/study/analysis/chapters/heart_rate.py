@@ -268,7 +268,7 @@ def _adjectives(
             for name, chosen_in in zip(LEVELS, sections, strict=True)
             if chosen_in
         ]  # fmt: skip
-        return list(item.options), panels
+        return (list(item.options), panels) if panels else None
     return None
 
 

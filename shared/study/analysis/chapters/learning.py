@@ -59,6 +59,13 @@ def learning_chapter(games: Games, generator: np.random.Generator) -> Chapter | 
         _rise_words(holm(rises), names),
         *_switch_words(switch),
     ]
+    pictures: list[Picture] = []
+    if panels := _panels(games, lines):
+        words = (
+            "Every game of everybody (dots), each person's own line (thin), and the line through "
+            "all games with its 95 % band."
+        )
+        pictures.append(Picture(lambda: learning_panels(panels), words))
     return Chapter(
         key="learning",
         title="Learning",
@@ -66,13 +73,7 @@ def learning_chapter(games: Games, generator: np.random.Generator) -> Chapter | 
         headlines=3,
         findings=(*lines, *means, *compared, *mixed, *holm(rises), *switch),
         tables=(_lines_table(lines, names), _slopes_table(games)),
-        pictures=(
-            Picture(
-                lambda: learning_panels(_panels(games, lines)),
-                "Every game of everybody (dots), each person's own line (thin), and the line "
-                "through all games with its 95 % band.",
-            ),
-        ),
+        pictures=tuple(pictures),
     )
 
 
