@@ -185,7 +185,7 @@ class Stand:
         self.study_bus = self.hub.join("study-0")
 
         def write_tables() -> None:
-            if self._has_tables:
+            if self._has_tables and self.session.is_over:
                 write_session(self.study_folder, "sub-01")
                 write_participants(self.study_folder)
 
