@@ -116,7 +116,7 @@ class Desk:
         if item.scale == "choices":
             return Answer(item=item.id, choices=attitudes.choices(item, self._rng))
         if item.scale == "open":
-            return Answer(item=item.id, text=attitudes.SIMULATED_TEXT)
+            return Answer(item=item.id, text=attitudes.words(item, self._traits))
         means = [self._mean_score(number) for number in sections_to_rank(self._session)]
         success = attitudes.standardised(self._mean_score(step.section), means)
         return Answer(

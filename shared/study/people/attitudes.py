@@ -46,6 +46,11 @@ def choices(item: Item, rng: np.random.Generator) -> tuple[str, ...]:
     return chosen or (options[int(rng.integers(len(options)))],)
 
 
+def words(item: Item, traits: Traits) -> str:
+    """Return an answer in one's own words: the age where that is asked for, else nothing real."""
+    return f"{traits.age:.0f}" if item.construct.lower() == "age" else SIMULATED_TEXT
+
+
 def ranks(item: Item, scores: Sequence[float], rng: np.random.Generator) -> tuple[int, ...]:
     """Return a place for each finished section, 1 the least; equal places are ties.
 

@@ -5,7 +5,7 @@ import pytest
 
 from shared.study.analysis.games import Games
 from shared.study.analysis.power import plan
-from shared.study.people.attitudes import choices, points, ranks
+from shared.study.people.attitudes import SIMULATED_TEXT, choices, points, ranks, words
 from shared.study.people.chapter import (
     NOT_PEOPLE,
     rehearsal_chapter,
@@ -83,6 +83,10 @@ def test_answers_fit_their_items():
                          "enthusiasm": 1.5, "acquiescence": 0.0})  # fmt: skip
     agrees = np.mean([points(scale, keen, 0.0, rng) for _ in range(200)])
     assert agrees > 3.0 > np.mean([points(turned, keen, 0.0, rng) for _ in range(200)])
+    why = Item(id="why", construct="open", text="Why?", scale="open")
+    assert words(why, person) == SIMULATED_TEXT
+    age = Item(id="age", construct="age", text="How old are you?", scale="open")
+    assert 18 <= int(words(age, person)) <= 60
     several = Item(
         id="A", construct="A", text="Which?", scale="choices", options=("x", "y", "other"),
         is_several=True, other="other",
