@@ -5,6 +5,7 @@ that was begun before goes on where its journal ends.
 """
 
 import argparse
+import importlib.util
 import os
 import sys
 from collections.abc import Mapping, Sequence
@@ -128,7 +129,10 @@ def plan_of(study: Study, found: argparse.Namespace) -> Plan:
     Raises:
         ConfigError: a value or a port cannot be used.
         SnapshotError: a player of the protocol is not there or does not fit.
+        ModuleNotFoundError: an optional library is missing.
     """
+    if importlib.util.find_spec("websockets") is None:  # of the pages
+        raise ModuleNotFoundError("No module named 'websockets'", name="websockets")
     site: Path | None = found.site
     words = [*(() if site is not None else LAPTOP), *found.overrides]
     cfg = load_section(site, "study", StudyConfig, words)
