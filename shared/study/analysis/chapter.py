@@ -50,7 +50,7 @@ class Chapter:
 
 
 def number_text(value: float | None, digits: int = 3) -> str:
-    """Return a number with so many significant digits, whole numbers whole, a proper minus."""
+    """Return a number with so many significant digits, all before the point, a proper minus."""
     if value is None or not math.isfinite(value):
         return "-"
     if value == 0.0:

@@ -37,7 +37,8 @@ def mixed_slopes(games: Floats, first: Floats, second: Floats, question: str) ->
 
     Fixed: condition, game, condition x game. Random by person, independent of each other: the
     same and an intercept, less what keeps the fit from converging. Restricted maximum likelihood;
-    p and interval by t with people - 1 degrees of freedom: z is too sure with few people.
+    p and interval by t with people - 1 degrees of freedom: z is too sure with few people. That is
+    cautious where people's slopes differ alike in both conditions (docs/study_analysis.md).
 
     Args:
         games: float64[k], game numbers.

@@ -140,7 +140,7 @@ def _row(finding: Finding, *, is_beside: bool) -> list[Node]:
 
 
 def _p(value: float | None, soft: str | None, *, is_decisive: bool) -> Html:
-    text = "" if value is None else p_text(value)
+    text = "" if value is None else p_text(value).replace(" ", "\N{NO-BREAK SPACE}")
     if value is not None and value < 0.05 and is_decisive and soft is None:
         return tag("b", text)
     return tag("span", text, class_=soft)
@@ -151,7 +151,9 @@ def _statistic(finding: Finding) -> str:
         return "-"
     df = ", ".join(f"{value:.4g}" for value in finding.df)
     name = f"{finding.symbol}({df})" if df else finding.symbol
-    return f"{name} = {number_text(finding.statistic, 3)}"
+    digits = 3 if finding.df or not finding.statistic.is_integer() else 1
+    value = number_text(finding.statistic, max(digits, len(f"{abs(finding.statistic):.0f}")))
+    return f"{name} = {value}"
 
 
 def _estimate(estimate: Estimate | None) -> str:
