@@ -44,6 +44,7 @@ class FencingBatch:
     """float64[N, 14], joint angles, antagonist first (rad)."""
     qvel: Float64
     """float64[N, 14] (rad/s)."""
+
     def __init__(
         self,
         model: FencingModel,
