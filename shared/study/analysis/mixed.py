@@ -27,6 +27,8 @@ RANDOM = ((0, 1, 2, 3), (0, 1, 3), (0, 1))
 """Which terms vary from person to person, tried in this order until a fit converges: a variance
 that the data cannot tell from zero is what keeps it from that (Bates et al. 2015,
 arXiv:1506.04967). Game goes first, because only condition x game bears on the question."""
+SAME = 1.05
+"""Times the variance that games alone give; above it, people's differences of slope vary."""
 OPTIMISER = "lbfgs"
 """Follows the gradient; powell and nm also move the covariances that are fixed at zero here, and
 fit another model than they were asked for."""
@@ -37,8 +39,8 @@ def mixed_slopes(games: Floats, first: Floats, second: Floats, question: str) ->
 
     Fixed: condition, game, condition x game. Random by person, independent of each other: the
     same and an intercept, less what keeps the fit from converging. Restricted maximum likelihood;
-    p and interval by t with people - 1 degrees of freedom: z is too sure with few people. That is
-    cautious where people's slopes differ alike in both conditions (docs/study_analysis.md).
+    p and interval by t, z is too sure with few people: with people - 1 degrees of freedom where
+    people differ in the difference of their slopes, with those of the games where they do not.
 
     Args:
         games: float64[k], game numbers.
@@ -65,7 +67,10 @@ def mixed_slopes(games: Floats, first: Floats, second: Floats, question: str) ->
         return not_done(question, TEST, people, why, left_out=left_out)
     unit = scale / max(float(np.std(games)), 1e-12)
     value, error = float(fit.fe_params[3]) * unit, float(fit.bse_fe[3]) * unit
-    t, df = value / error, people - 1.0
+    within = float(fit.scale * np.linalg.inv(design.T @ design)[3, 3])
+    is_varying = float(fit.bse_fe[3]) ** 2 > SAME * within
+    t = value / error
+    df = people - 1.0 if is_varying else max(people - 1.0, float(len(y) - len(TERMS) * people))
     half = float(stats.t.ppf(1.0 - TAIL, df)) * error
     return Finding(
         question=question,
