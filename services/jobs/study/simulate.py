@@ -127,8 +127,8 @@ def _power(games: Games, faster: str, seed: int) -> Planned | None:
 
 def _with(found: Analysis, chapter: Chapter) -> Analysis:
     own = ChapterResults(
-        key=chapter.key, title=chapter.title, says=chapter.says, findings=chapter.findings,
-        tables=chapter.tables,
+        key=chapter.key, title=chapter.title, says=chapter.says, headlines=chapter.headlines,
+        findings=chapter.findings, tables=chapter.tables,
     )  # fmt: skip
     results = msgspec.structs.replace(found.results, chapters=(own, *found.results.chapters))
     return Analysis(results, (chapter, *found.chapters))

@@ -142,8 +142,8 @@ def rehearsal_chapter(
     if planned is not None:
         tables = (*tables, _power_table(planned))
     return Chapter(
-        key="rehearsal", title="A rehearsal", says=tuple(says), findings=tuple(findings),
-        tables=tables,
+        key="rehearsal", title="A rehearsal", says=tuple(says), headlines=len(says),
+        findings=tuple(findings), tables=tables,
     )  # fmt: skip
 
 
