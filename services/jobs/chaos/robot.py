@@ -54,7 +54,6 @@ WATCHER = ("bus.open_seconds=2.0", "bus.give_up_seconds=3600.0")
 ANSWER_SECONDS = 3.0
 JUMP_SECONDS = 3.0
 """How long a clock is wrong."""
-EXIT_INTERRUPTED = 130
 
 
 class Match(Job):
@@ -182,10 +181,10 @@ class Match(Job):
         )  # fmt: skip
 
     def finish(self) -> int:
-        """Stop it as Ctrl-C does; return the exit code."""
+        """Stop it as Ctrl-C does; return the exit code, 0 for a match without a last bout."""
         self.poll()
         code = self.interrupt(FINISH_SECONDS)
-        self.finished = code == EXIT_INTERRUPTED and (self.folder / "summary.json").exists()
+        self.finished = code == 0 and (self.folder / "summary.json").exists()
         return code
 
     def close(self) -> None:
