@@ -79,8 +79,8 @@ def _by_conditions(
         found = paired(means[:, 0], means[:, 1], Named(question))
         if found.p is not None and found.estimate is not None:
             says.append(
-                f"People scored {estimate_words(found.estimate)} points more against {names[0]} "
-                f"than against {names[1]} ({p_words(found)}): "
+                f"A person's mean score against {names[0]}, less that against {names[1]}: "
+                f"{estimate_words(found.estimate)} points ({p_words(found)}), "
                 f"{verdict(found, 'a significant difference', 'no significant difference')}."
             )
         return (found,), says
