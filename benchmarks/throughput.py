@@ -120,7 +120,7 @@ def rollouts(bus: ZenohBus, rounds: int, processes: list[psutil.Process]) -> dic
 
 def bare_tcp(rounds: int, size: int) -> float:
     """Return MB/s of the same bytes through one TCP connection, acknowledged by one byte."""
-    with start("--sink", str(size)) as process:
+    with start("tcp", "--receive", "--size", str(size), module="benchmarks.wires.ends") as process:
         assert process.stdout is not None
         port = int(process.stdout.readline())
         payload = bytes(size)
@@ -133,23 +133,6 @@ def bare_tcp(rounds: int, size: int) -> float:
             for _ in range(min(rounds, WINDOW)):
                 link.recv(1)
             return rounds * size / 1e6 / (time.perf_counter() - begin)
-
-
-def sink(size: int) -> None:
-    """Acknowledge every ``size`` bytes with one; the other end of ``bare_tcp``."""
-    buffer = memoryview(bytearray(size))
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        print(server.getsockname()[1], flush=True)
-        link, _ = server.accept()
-        with link:
-            while True:
-                at = 0
-                while at < size:
-                    got = link.recv_into(buffer[at:])
-                    if not got:
-                        return
-                    at += got
-                link.sendall(b"k")
 
 
 def answer(endpoint: str) -> None:
@@ -247,15 +230,10 @@ def figures(smoke: bool) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Be the other end of something."""
+    """Be the other end of the bus."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--answer", metavar="ENDPOINT")
-    parser.add_argument("--sink", type=int)
-    args = parser.parse_args()
-    if args.answer:
-        answer(args.answer)
-    else:
-        sink(args.sink)
+    parser.add_argument("--answer", required=True, metavar="ENDPOINT")
+    answer(parser.parse_args().answer)
 
 
 if __name__ == "__main__":
