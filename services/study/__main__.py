@@ -11,6 +11,7 @@ import structlog
 
 from services.study.config import StudyConfig
 from services.study.course import Terms
+from services.study.lsl import LslOutlet
 from services.study.opening import plan_of
 from services.study.service import Study, asks_of
 from services.study.web import Web, token_of
@@ -53,7 +54,10 @@ def build(args: ServeArgs, bus: Bus, clock: Clock) -> Study:
     try:
         asks = asks_of(journal)
         window = Web(cfg.host, cfg.port, cfg.origins, token=token_of(folder), asks=asks)
-        service = Study(plan, folder, terms, journal, asks, window, write_tables, bus, clock)
+        outlet = LslOutlet(plan.participant, plan.session) if cfg.lsl else None
+        service = Study(
+            plan, folder, terms, journal, asks, window, write_tables, bus, clock, outlet
+        )
         write_place(args.run, window)
     except BaseException:
         journal.close()

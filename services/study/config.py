@@ -28,6 +28,8 @@ class StudyConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """How long the score is shown after a game (s)."""
     needs_recorder: bool = True
     """Whether games that count wait for a recorder."""
+    lsl: bool = False
+    """Offer events and heart rate as Lab Streaming Layer streams, to everybody on the network."""
 
     def __post_init__(self) -> None:
         """Check the ranges.

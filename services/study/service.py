@@ -16,6 +16,7 @@ from services.study.course import Terms
 from services.study.errands import Errands
 from services.study.hearing import Hearing
 from services.study.heart import HeartLog
+from services.study.lsl import Outlet
 from services.study.plan import SessionPlan
 from services.study.session import Session
 from services.study.showing import (
@@ -76,6 +77,7 @@ class Study:
     def __init__(
         self, plan: SessionPlan, folder: Path, terms: Terms, journal: Journal, asks: Asks,
         window: Window | None, write_tables: Callable[[], None], bus: Bus, clock: Clock,
+        outlet: Outlet | None = None,
     ) -> None:  # fmt: skip
         """Join the bus, and go on where the journal ends.
 
@@ -89,6 +91,7 @@ class Study:
             write_tables: makes the session's tables from its journal.
             bus: this process's end of the bus.
             clock: a clock that moves by itself, or is moved.
+            outlet: is told of events and heart rate, where somebody records them elsewhere.
 
         Raises:
             StudyError: the journal is none of this plan's.
@@ -104,6 +107,9 @@ class Study:
         self.session = Session(plan, journal, Errands(bus), clock, terms)
         self._answering = Answering(self.session)
         self._heart = HeartLog(plan, RowLog(folder / HEART_RATE, HeartRateRow), clock)
+        self._outlet = outlet
+        self._told = len(self.session.events)
+        """Events that the outlet knows, or that were before it."""
         self._shown_at = -1e9
         self._tabled = 0
         """Events that the tables hold."""
@@ -119,6 +125,8 @@ class Study:
         heard = self._hearing.listen()
         session = self.session
         self._heart.add(heard.beats, session.step, session.progress, heard.beats_per_minute)
+        if self._outlet is not None and session.progress.has_consent:
+            self._outlet.beats(heard.beats)
         did = session.tick(heard)
         for _ in range(TAKE_MOST):
             if (ask := self._asks.take()) is None:
@@ -129,6 +137,10 @@ class Study:
         for reply in self._answering.tick():
             did = True
             self._tell(reply)
+        if self._outlet is not None:
+            for event in session.events[self._told :]:
+                self._outlet.event(event)
+            self._told = len(session.events)
         self._keep_tables()
         self._show()
         if not session.waits_for:

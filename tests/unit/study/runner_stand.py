@@ -13,6 +13,7 @@ from services.referee.service import Referee
 from services.study.asks import Asks
 from services.study.config import StudyConfig
 from services.study.course import Terms
+from services.study.lsl import Outlet
 from services.study.opening import plan_of
 from services.study.service import Study, asks_of
 from services.study.view import (
@@ -128,9 +129,12 @@ class Pages:
 class Stand:
     """A study and everybody it talks to."""
 
-    def __init__(self, folder: Path, *, has_tables: bool = False) -> None:
+    def __init__(
+        self, folder: Path, *, has_tables: bool = False, outlet: Outlet | None = None
+    ) -> None:
         """Start everybody; tables are many files, each synced to the disk."""
         self._has_tables = has_tables
+        self._outlet = outlet
         self.clock = ManualClock(AT)
         self.hub = MemoryHub(self.clock, max_messages=4096)
         if not (folder / "protocol.toml").exists():
@@ -192,7 +196,7 @@ class Stand:
         plan = plan_of(self.study_folder, cfg, b"settings")
         self.study = Study(
             plan, self.session_folder, Terms(countdown=0.5, score_seconds=0.5), self.journal,
-            self.asks, self.pages, write_tables, self.study_bus, self.clock,
+            self.asks, self.pages, write_tables, self.study_bus, self.clock, self._outlet,
         )  # fmt: skip
         self.session = self.study.session
 
