@@ -6,7 +6,6 @@ import fcntl
 import os
 import shutil
 from pathlib import Path
-from types import TracebackType
 
 from shared.errors import RiposteError
 
@@ -102,13 +101,34 @@ class RunLock:
     def __enter__(self) -> "RunLock":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def append_at(descriptor: int, end: int, data: bytes, path: Path, *, is_synced: bool) -> int:
+    """Add to an open file that ends at ``end``, or leave it as it was; return where it ends now.
+
+    Args:
+        descriptor: of the file.
+        end: its size (bytes).
+        data: what is added.
+        path: of the file, for messages.
+        is_synced: return when it is on the disk.
+
+    Raises:
+        RiposteError: there is no space, or the file cannot be written.
+    """
+    view, at = memoryview(data), end
+    try:
+        while view:
+            written = os.pwrite(descriptor, view, at)
+            view, at = view[written:], at + written
+        if is_synced:
+            os.fsync(descriptor)
+    except OSError as error:
+        os.ftruncate(descriptor, end)
+        raise explain(error, path, len(data)) from error
+    return at
 
 
 def _write_all(descriptor: int, data: memoryview) -> None:

@@ -6,14 +6,13 @@ was not counted by anybody, and is dropped when the journal is opened again.
 
 import os
 from pathlib import Path
-from types import TracebackType
 from typing import Final
 
 import msgspec
 
 from shared.clock import Clock
 from shared.errors import StudyError
-from shared.runtime.files import RunLock, explain, sync_folder
+from shared.runtime.files import RunLock, append_at, explain, sync_folder
 from shared.study.events import Event, SessionBegan, What
 from shared.study.instants import clock_problem
 
@@ -80,13 +79,7 @@ class Journal:
             what=what,
         )
         line = _ENCODER.encode(event) + b"\n"
-        try:
-            _append(self._file, self._size, line)
-            os.fsync(self._file)
-        except OSError as error:
-            os.ftruncate(self._file, self._size)
-            raise explain(error, self.path, len(line)) from error
-        self._size += len(line)
+        self._size = append_at(self._file, self._size, line, self.path, is_synced=True)
         self._events.append(event)
         return event
 
@@ -100,12 +93,7 @@ class Journal:
     def __enter__(self) -> "Journal":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _open(self, folder: Path) -> None:
@@ -179,10 +167,3 @@ def decode_events(data: bytes, name: str) -> tuple[list[Event], int]:
 def _read(path: Path) -> bytes:
     with path.open("rb") as file:
         return file.read(MAX_BYTES + 1)
-
-
-def _append(descriptor: int, at: int, data: bytes) -> None:
-    view = memoryview(data)
-    while view:
-        written = os.pwrite(descriptor, view, at)
-        view, at = view[written:], at + written

@@ -8,13 +8,12 @@ import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Final, NamedTuple, TypeVar
 
 import msgspec
 
 from shared.errors import StudyError
-from shared.runtime.files import atomic_write, explain
+from shared.runtime.files import append_at, atomic_write, explain
 
 R = TypeVar("R", bound=msgspec.Struct)
 
@@ -149,27 +148,14 @@ class RowLog:
     def __enter__(self) -> "RowLog":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _append(self, line: str) -> None:
         if self._file is None:
             raise ValueError(f"{self.path.name} is closed")
-        data = memoryview(f"{line}\n".encode())
-        at = self._size
-        try:
-            while data:
-                written = os.pwrite(self._file, data, at)
-                data, at = data[written:], at + written
-        except OSError as error:
-            os.ftruncate(self._file, self._size)
-            raise explain(error, self.path, len(line)) from error
-        self._size = at
+        data = f"{line}\n".encode()
+        self._size = append_at(self._file, self._size, data, self.path, is_synced=False)
 
 
 def _whole_lines(descriptor: int) -> int:
