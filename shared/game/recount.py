@@ -34,21 +34,32 @@ def recount(bout: ArchivedBout, rules: RuleBook, bat: BatShape, target: Target) 
             f"{bout.folder} was recorded from step {info.from_step} on; "
             "a score can only be counted from the start"
         )
+    scores = Scoreboard(1, rules, bat, target)
+    for states in judged_states(bout):
+        judge_states(scores, states[None])
+    return scores
+
+
+def judged_states(bout: ArchivedBout) -> Array:
+    """Return float64[K, 2, 13], the states of both bats in each step that was judged, in order.
+
+    Raises:
+        RiposteError: the archive lacks what was judged; says which tick.
+    """
     rows = bout.streams.get(BATS.name)
     if rows is None:
         raise RiposteError(f"{bout.folder} has no bat states")
-    states = {
+    places = {
         tick: k
         for k, (tick, boot) in enumerate(zip(rows[TICK].tolist(), rows["boot"], strict=True))
-        if boot == info.robot_io_boot
+        if boot == bout.info.robot_io_boot
     }
-    bats = bout.bats()
-    scores = Scoreboard(1, rules, bat, target)
-    for tick in judged_ticks(bout):
-        if tick not in states:
-            raise RiposteError(f"{bout.folder} has no bat states of tick {tick}, which was judged")
-        judge_states(scores, bats[states[tick]][None])
-    return scores
+    ticks = judged_ticks(bout)
+    if missing := [tick for tick in ticks if tick not in places]:
+        raise RiposteError(
+            f"{bout.folder} has no bat states of tick {missing[0]}, which was judged"
+        )
+    return bout.bats()[[places[tick] for tick in ticks]]
 
 
 def judged_ticks(bout: ArchivedBout) -> list[int]:

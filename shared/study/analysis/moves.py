@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.errors import RiposteError
-from shared.game.recount import judged_ticks
+from shared.game.recount import judged_states
 from shared.messages.training import AGENTS
 from shared.study.analysis.games import Games
 from shared.study.recorded import bout_folder
 from shared.styles.features import FEATURES, StyleMeter
 from shared.telemetry.archive import ArchivedBout, load_bout
-from shared.telemetry.streams import BATS, TICK
 
 Floats = NDArray[np.float64]
 HUMAN = AGENTS.index("antagonist")
@@ -66,22 +65,9 @@ def bout_features(bout: ArchivedBout) -> Floats:
     Raises:
         RiposteError: the archive lacks what was judged, or is too short for a jerk.
     """
-    rows = bout.streams.get(BATS.name)
-    if rows is None:
-        raise RiposteError(f"{bout.folder} has no bat states")
-    states = {
-        tick: k
-        for k, (tick, boot) in enumerate(zip(rows[TICK].tolist(), rows["boot"], strict=True))
-        if boot == bout.info.robot_io_boot
-    }
-    ticks = judged_ticks(bout)
-    if missing := [tick for tick in ticks if tick not in states]:
-        raise RiposteError(
-            f"{bout.folder} has no bat states of tick {missing[0]}, which was judged"
-        )
-    if len(ticks) < 3:
-        raise RiposteError(f"{bout.folder} has {len(ticks)} judged steps, its jerk needs 3")
-    bats = bout.bats()[[states[tick] for tick in ticks]]
+    bats = judged_states(bout)
+    if len(bats) < 3:
+        raise RiposteError(f"{bout.folder} has {len(bats)} judged steps, its jerk needs 3")
     meter = StyleMeter(1, bout.info.control_timestep)
     for bat in bats:  # [2, 13] -> [3, 2, 1]: x y z, side, one bout
         meter.add(bat[:, 0:3].T[:, :, None], bat[:, 7:10].T[:, :, None])
