@@ -30,8 +30,7 @@ def pearson(x: Floats, y: Floats, question: str, *, unit: str = "people") -> Fin
     test = "Pearson correlation"
     one, two, left_out = _complete(x, y, unit)
     n = len(one)
-    if n < FEWEST or np.ptp(one) == 0.0 or np.ptp(two) == 0.0:
-        why = f"{n} pairs, it needs {FEWEST} that vary"
+    if why := _why_not(one, two):
         return not_done(question, test, n, why, unit=unit, left_out=left_out)
     found: Any = stats.pearsonr(one, two)
     r = float(found.statistic)
@@ -56,8 +55,7 @@ def spearman(x: Floats, y: Floats, question: str, *, unit: str = "people") -> Fi
     test = "Spearman correlation"
     one, two, left_out = _complete(x, y, unit)
     n = len(one)
-    if n < FEWEST or np.ptp(one) == 0.0 or np.ptp(two) == 0.0:
-        why = f"{n} pairs, it needs {FEWEST} that vary"
+    if why := _why_not(one, two):
         return not_done(question, test, n, why, unit=unit, left_out=left_out)
     found: Any = stats.spearmanr(one, two)
     rho = float(found.statistic)
@@ -118,6 +116,13 @@ def _centred(values: Floats, kept: NDArray[np.bool_]) -> Floats:
     count = np.maximum(kept.sum(axis=1), 1)
     means = np.where(kept, values, 0.0).sum(axis=1) / count
     return (values - means[:, None])[kept]
+
+
+def _why_not(one: Floats, two: Floats) -> str:
+    """Return why complete pairs cannot be correlated; empty where they can."""
+    if len(one) >= FEWEST and np.ptp(one) > 0.0 and np.ptp(two) > 0.0:
+        return ""
+    return f"{len(one)} pairs, it needs {FEWEST} that vary"
 
 
 def _complete(x: Floats, y: Floats, unit: str) -> tuple[Floats, Floats, tuple[str, ...]]:
