@@ -98,21 +98,25 @@ def run(peer: Peer, work: Work) -> dict[str, Any]:
     """
     python = interpreter(peer.requirements) if peer.requirements else Path(sys.executable)
     command = [python, "-m", f"benchmarks.peer_loops.{peer.module}", msgspec.json.encode(work)]
-    with tempfile.TemporaryDirectory(prefix="riposte-peer-") as folder:
+    with (
+        tempfile.TemporaryDirectory(prefix="riposte-peer-", ignore_cleanup_errors=True) as folder,
+        (Path(folder) / "said").open("w+", encoding="utf-8") as said,  # a worker holds a pipe open
+    ):
         started = subprocess.Popen(
-            command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            command, cwd=folder, stdout=said, stderr=subprocess.STDOUT,
             env=os.environ | {"PYTHONPATH": str(ROOT), "RAY_TMPDIR": folder},
             start_new_session=True,
         )  # fmt: skip
         try:
-            said, _ = started.communicate(timeout=DEADLINE + work.seconds)
+            started.wait(timeout=DEADLINE + work.seconds)
         except subprocess.TimeoutExpired:
             raise PeerFailedError(f"{peer.name} had not ended after {DEADLINE:g} s more") from None
         finally:
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(started.pid, signal.SIGKILL)
             started.wait()
-    lines = said.strip().splitlines()
+        said.seek(0)
+        lines = said.read().strip().splitlines()
     if started.returncode or not lines:
         raise PeerFailedError(f"{peer.name} ended with {started.returncode}: {lines[-1:]}")
     timing = msgspec.json.decode(lines[-1], type=Timing)
