@@ -164,8 +164,7 @@ class ScalingSite(RunReader):
             time.sleep(POLL_SECONDS)
         raise RiposteError(
             f"{sum(totals.leased for totals in self.totals())} of {self.crowd.actors} actors had a "
-            f"lease after {START_SECONDS:g} s, version {self.newest_checkpoint()}: see "
-            f"{self.folder / 'logs'}"
+            f"lease after {START_SECONDS:g} s, version {self.newest_checkpoint()}"
         )
 
     def check(self) -> None:
