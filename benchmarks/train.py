@@ -5,34 +5,24 @@ runner gets the number of worlds and of torch threads that suits it best; the ru
 `riposte train` starts, with its recorder, but with the live page off. Rounds are interleaved.
 """
 
-import json
 import os
-import subprocess
-import sys
+import tempfile
+from pathlib import Path
 from typing import Any
 
-from benchmarks.harness import ROOT, interleaved, median
+from benchmarks.harness import interleaved, median
+from benchmarks.peer_loops.running import Peer, fresh_protagonist, run, work_of
 from benchmarks.training_run import training_run
 from services.jobs.bench import Check, Measurement
+from services.jobs.settings import Settings
 
 QUESTION = "training samples/s of a real run against rsl_rl's runner in one process, on two cores"
 GOAL = 1.5
-CHOICES = ((128, 1), (256, 1), (512, 1), (256, 2))
+RUNNERS = tuple(
+    Peer(name="rsl_rl's runner", module="rsl_rl_runner", num_envs=num_envs, threads=threads)
+    for num_envs, threads in ((128, 1), (256, 1), (512, 1), (256, 2))
+)
 """Worlds and torch threads that the runner may choose from."""
-
-
-def baseline(num_envs: int, threads: int, seconds: float) -> dict[str, Any]:
-    """Return how fast rsl_rl's runner trains, in a process of its own."""
-    command = [
-        sys.executable, "-m", "benchmarks.baseline_rsl_rl", "--seconds", str(seconds),
-        "--num-envs", str(num_envs), "--threads", str(threads),
-    ]  # fmt: skip
-    done = subprocess.run(
-        command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=600
-    )
-    if done.returncode:
-        raise SystemExit(f"the baseline failed: {done.stderr.strip().splitlines()[-1]}")
-    return json.loads(done.stdout)
 
 
 def ours(seconds: float) -> dict[str, Any]:
@@ -46,14 +36,19 @@ def measure(smoke: bool) -> Measurement:
     cores = sorted(os.sched_getaffinity(0))
     os.sched_setaffinity(0, cores[:2])
     seconds, rounds = (1.0, 1) if smoke else (25.0, 4)
-    choices = CHOICES[:1] if smoke else CHOICES
-    tried = [baseline(*choice, min(seconds, 10.0)) for choice in choices]
-    best = max(tried, key=lambda figures: figures["samples_per_s"])
+    settings = Settings.load(None)
+    with tempfile.TemporaryDirectory(prefix="riposte-train-") as folder:
+        opponent = fresh_protagonist(settings, Path(folder) / "opponent.safetensors")
 
-    def best_baseline() -> dict[str, Any]:
-        return baseline(int(best["num_envs"]), int(best["threads"]), seconds)
+        def theirs(runner: Peer, seconds: float) -> dict[str, Any]:
+            return run(runner, work_of(runner, settings, opponent, seconds))
 
-    pairs = interleaved(rounds, [best_baseline, lambda: ours(seconds)])
+        tried = [
+            (runner, theirs(runner, min(seconds, 10.0)))
+            for runner in RUNNERS[: 1 if smoke else None]
+        ]
+        best, _ = max(tried, key=lambda one: one[1]["samples_per_s"])
+        pairs = interleaved(rounds, [lambda: theirs(best, seconds), lambda: ours(seconds)])
     runs = tuple(
         {
             "ratio": our["samples_per_s"] / their["samples_per_s"],
@@ -82,5 +77,5 @@ def measure(smoke: bool) -> Measurement:
             Check(name="cores kept busy by ours", value=median(runs, "cores_busy")),
             Check(name="cores our processes waited for", value=median(runs, "cores_missed")),
         ),
-        details={"baselines_tried": tried},
+        details={"baselines_tried": [figures for _, figures in tried]},
     )  # fmt: skip

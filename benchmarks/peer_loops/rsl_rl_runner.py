@@ -1,30 +1,103 @@
-"""rsl_rl's own runner on the batched environment, timed as the others.
+"""rsl_rl's own runner on the batched environment, in one process.
 
-Its own `RolloutStorage`, normalisers and PPO; the environment is ours, given whole batches.
+Same networks, normalisation, epochs, minibatches, batch and learning rate as ``services/learner``;
+its own `RolloutStorage` and PPO, the bouts ours, given in whole batches.
 """
 # pyright: basic
 
 import contextlib
 import io
 
+import numpy as np
 import torch
+from rsl_rl.env import VecEnv
 from rsl_rl.runners import OnPolicyRunner
+from tensordict import TensorDict
 
-from benchmarks.baseline_rsl_rl import FencingVecEnv, runner_config
-from benchmarks.peer_loops.work import Stopwatch, Timing, Work, main
+from benchmarks.peer_loops.work import OUTPUTS, Stopwatch, Timing, Work, main
 from services.jobs.settings import Settings
+from services.learner.config import LearnerConfig
+
+
+class BatchedBouts(VecEnv):
+    """Our bouts as rsl_rl wants them."""
+
+    def __init__(self, work: Work) -> None:
+        self._bouts = work.batch()
+        self.num_envs = work.num_envs
+        self.num_actions = OUTPUTS
+        self.max_episode_length = Settings.load(None).game.bout_steps
+        self.episode_length_buf = torch.zeros(work.num_envs, dtype=torch.long)
+        self.device = "cpu"
+        self.cfg = {}
+        self._obs = self._seen(self._bouts.reset())
+
+    def get_observations(self) -> TensorDict:
+        """Return what the antagonists see now."""
+        return self._obs
+
+    def step(self, actions: torch.Tensor) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict]:
+        """Play one control step of every bout; finished ones start anew."""
+        turn = self._bouts.step(actions.numpy())
+        self._obs = self._seen(turn.obs)
+        dones = torch.from_numpy(turn.ended)
+        paid = torch.from_numpy(turn.paid.astype(np.float32))
+        return self._obs, paid, dones.long(), {"time_outs": dones}
+
+    def _seen(self, obs: np.ndarray) -> TensorDict:
+        return TensorDict({"policy": torch.from_numpy(obs)}, batch_size=[self.num_envs])
+
+
+def runner_config(cfg: LearnerConfig, steps: int) -> dict:
+    """Return the runner's configuration: ours, in its words."""
+    network = {
+        "class_name": "MLPModel",
+        "hidden_dims": list(cfg.hidden_dims),
+        "activation": cfg.activation,
+        "obs_normalization": True,
+    }
+    return {
+        "num_steps_per_env": steps,
+        "save_interval": 1_000_000,
+        "check_for_nan": False,
+        "obs_groups": {"actor": ["policy"], "critic": ["policy"]},
+        "algorithm": {
+            "class_name": "PPO",
+            "num_learning_epochs": cfg.epochs,
+            "num_mini_batches": cfg.minibatches,
+            "clip_param": cfg.clip,
+            "gamma": cfg.gamma,
+            "lam": cfg.gae_lambda,
+            "value_loss_coef": cfg.value_loss_coef,
+            "entropy_coef": cfg.entropy_coef,
+            "learning_rate": cfg.learning_rate,
+            "max_grad_norm": cfg.max_grad_norm,
+            "use_clipped_value_loss": False,
+            "schedule": "fixed",
+        },
+        "actor": network
+        | {
+            "distribution_cfg": {
+                "class_name": "GaussianDistribution",
+                "init_std": cfg.initial_std,
+                "std_type": "log",
+                "std_range": (cfg.minimum_std, cfg.maximum_std),
+            }
+        },
+        "critic": dict(network),
+    }
 
 
 def loop(work: Work) -> Timing:
     """Train until the window is over."""
     torch.set_num_threads(work.threads)
     torch.manual_seed(0)
-    settings = Settings.load(None)
     watch = Stopwatch(work)
-    env = FencingVecEnv(settings, work.num_envs, settings.actor.rollout_steps)
+    env = BatchedBouts(work)
+    cfg = Settings.load(None).learner
     samples = 0
     with contextlib.redirect_stdout(io.StringIO()):
-        runner = OnPolicyRunner(env, runner_config(settings.learner, work.steps), log_dir=None)
+        runner = OnPolicyRunner(env, runner_config(cfg, work.steps), log_dir=None)
         while True:
             runner.learn(1)
             samples += work.steps * work.num_envs

@@ -1,8 +1,9 @@
 import msgspec
 
 from benchmarks.environments import REQUIREMENTS
+from benchmarks.peer_loops.running import work_of
 from benchmarks.peer_loops.work import WARM_UP, Stopwatch, Work
-from benchmarks.peers import PEERS, work_of
+from benchmarks.peers import PEERS
 from services.jobs.settings import Settings
 
 
