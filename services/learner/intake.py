@@ -16,10 +16,12 @@ from services.learner.gate import (
     check_new,
     check_provenance,
     check_version,
+    remember,
+    stretches_of,
 )
 from shared.bus.base import Inbox, Request
 from shared.bus.delivery import Applied
-from shared.bus.ranges import LARGEST
+from shared.bus.ranges import LARGEST, Ranges
 from shared.clock import Clock
 from shared.game.rules import RuleBook
 from shared.messages.league import Leases, LeaseSummary, Schedule, Stage
@@ -80,8 +82,8 @@ class Intake:
         self._gathered: list[Held] = []
         self._committing: list[Held] = []
         self._first_refused_at: dict[str, float] = {}
-        self._seen: dict[str, set[tuple[int, int]]] = {}
-        """By lease, the bout and first step of every stretch that was held."""
+        self._seen: dict[str, Ranges] = {}
+        """By lease, the stretches of play that were held."""
 
     @property
     def in_turn(self) -> bool:
@@ -204,7 +206,7 @@ class Intake:
         ruling = self._rule(rollout, version)
         if ruling.decision is Decision.LEARN:
             self._first_refused_at.pop(rollout.lease, None)
-            self._seen.setdefault(rollout.lease, set()).update(_stretches(rollout))
+            remember(self._stretches(rollout), self._seen.setdefault(rollout.lease, Ranges()))
             self._gathered.append((request, rollout))
         elif ruling.decision is Decision.LATER and not self._is_too_late(rollout.lease):
             request.refuse(ruling.reason, retry=True)
@@ -223,8 +225,12 @@ class Intake:
         if ruling.decision is Decision.LEARN:
             ruling = check_contents(rollout, self._rules.bout_steps)
         if ruling.decision is Decision.LEARN:
-            ruling = check_new(_stretches(rollout), self._seen.get(rollout.lease, set()))
+            seen = self._seen.get(rollout.lease, Ranges())
+            ruling = check_new(self._stretches(rollout), seen, self._rules.bout_steps)
         return ruling
+
+    def _stretches(self, rollout: Rollout) -> list[tuple[int, int]]:
+        return stretches_of(rollout, self._rules.bout_steps)
 
     def _oldest(self, version: int) -> int:
         """Return the oldest version accepted; version 0 acted without a normaliser."""
@@ -243,8 +249,3 @@ class Intake:
         self.counters["rollouts_dropped"] += 1
         log.info("rollout_dropped", name=request.message.name, reason=reason)
         request.reply(Receipt(accepted=False, reason=reason))
-
-
-def _stretches(rollout: Rollout) -> set[tuple[int, int]]:
-    """Return bout and first step of each world."""
-    return set(zip(rollout.bouts.tolist(), rollout.first_step.tolist(), strict=True))

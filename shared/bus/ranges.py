@@ -59,6 +59,28 @@ class Ranges:
             firsts.insert(at, number)
             lasts.insert(at, number)
 
+    def overlaps(self, first: int, last: int) -> bool:
+        """Return whether a number from ``first`` to ``last`` is in the set."""
+        at = bisect.bisect_right(self._firsts, last) - 1
+        return at >= 0 and self._lasts[at] >= first
+
+    def cover(self, first: int, last: int) -> None:
+        """Enter all numbers from ``first`` to ``last``; those that are there change nothing.
+
+        Raises:
+            ValueError: the range ends before it begins, or is not from 0 on.
+            OverflowError: ``last`` is larger than ``LARGEST``.
+        """
+        if first < 0 or last < first:
+            raise ValueError(f"there are no numbers from {first} to {last}")
+        firsts, lasts = self._firsts, self._lasts
+        begin = bisect.bisect_left(lasts, first - 1)  # the first range that it touches, or none
+        end = bisect.bisect_right(firsts, min(last, LARGEST - 1) + 1)
+        if begin < end:
+            first, last = min(first, firsts[begin]), max(last, lasts[end - 1])
+        lasts[begin:end] = array("q", (last,))
+        firsts[begin:end] = array("q", (first,))
+
     def append(self, first: int, last: int) -> None:
         """Enter a range after all others, with a gap before it.
 
