@@ -1,25 +1,16 @@
 """Coverage-guided fuzzing of one target; our mutators break what has reached new code."""
 
 import os
-import struct
 import sys
 import tempfile
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 from random import Random
 
 import atheris
-import pyarrow as pa
 
 from tests.fuzz import mutate
 from tests.fuzz.target import Target
-
-NOT_VALID = (
-    ValueError, LookupError, TypeError, AttributeError, OverflowError, RecursionError, EOFError,
-    AssertionError, SyntaxError, OSError, struct.error, zlib.error, pa.ArrowException,
-)  # fmt: skip
-"""What our mutators run into where an input is no valid sample any more."""
 
 
 def run(target: Target, read: Callable[[bytes], None], end: Callable[[], None], seed: int) -> None:
@@ -36,7 +27,7 @@ def run(target: Target, read: Callable[[bytes], None], end: Callable[[], None], 
         random = Random(number)
         try:
             return target.mutate(random, data or random.choice(target.samples))[:most]
-        except NOT_VALID:
+        except Exception:  # whatever it says of what is no valid sample any more
             return mutate.raw(random, data)[:most]
 
     with tempfile.TemporaryDirectory() as corpus:
