@@ -29,7 +29,7 @@ from shared.sim.env import FencingEnv
 from shared.sim.model import FencingModel
 
 QUESTION = "how much of Batch.step's speed is left in the whole actor loop, on one core"
-GOAL = 0.80
+GOAL = 0.85
 ROLLOUT_STEPS = 40
 WARM_UP = 12
 """Rollouts before the first round: the bats have met by then."""

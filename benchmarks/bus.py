@@ -16,7 +16,7 @@ from benchmarks.training_run import ENDLESS, training_run
 from services.jobs.bench import Check, Measurement
 
 QUESTION = "which share of a training run's CPU seconds goes into bus and codec"
-GOAL = 0.10
+GOAL = 0.05
 RERUN_THREADS = ("ChunkBatcher", "RecordingStream", "jemalloc", "rerun", "re_", "log_sink")
 """How the names of the recorder's own threads begin."""
 

@@ -28,7 +28,7 @@ from shared.errors import ConfigError, LedgerError, RiposteError
 
 QUESTION = "start-up time and memory of each process, and seconds to the first learner update"
 FIRST_UPDATE_GOAL = 15.0
-ACTOR_MB_GOAL = 200.0
+ACTOR_MB_GOAL = 150.0
 HELP_GOAL = 0.5
 DEADLINE = 180.0
 """Longest wait for an update on a busy machine (s)."""

@@ -4,6 +4,8 @@ from typing import Literal
 
 import msgspec
 
+from shared.messages.league import Stage
+
 
 class LearnerConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One agent's PPO; the defaults are those the README's numbers were made with."""
@@ -78,3 +80,14 @@ class LearnerConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         for name in ("max_lag", "warm_up_samples", "entropy_coef", "value_loss_coef"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} ({getattr(self, name)}) must not be negative")
+
+    def learning_rate_in(self, stage: Stage | None, updates: int) -> float:
+        """Return Adam's step after so many updates of a stage: a line down to its budget's end.
+
+        It follows from the stage alone, so that late rollouts cannot move it. In phase two it
+        does not fall.
+        """
+        if stage is not None and stage.phase == "two":
+            return self.phase_two_learning_rate
+        share = 0.0 if stage is None else min(updates / stage.max_updates, 1.0)
+        return self.learning_rate + share * (self.final_learning_rate - self.learning_rate)

@@ -247,7 +247,7 @@ class Learner:
         if self.version == 0 and self._cfg.warm_up_samples:
             self._optimiser.warm_up(rollouts)
         else:
-            learning_rate = self._learning_rate(done)
+            learning_rate = self._cfg.learning_rate_in(self._intake.stage, done)
             stats = self._optimiser.update(rollouts, learning_rate)
             lag = float(np.mean([self.version - r.policy_version for r in rollouts]))
             self._total_samples += stats.samples
@@ -281,19 +281,6 @@ class Learner:
             wait_seconds=waited,
             update_seconds=seconds,
         )
-
-    def _learning_rate(self, done: int) -> float:
-        """Return Adam's step after so many updates of the stage: a line down to its budget's end.
-
-        It follows from the stage alone, so that late rollouts cannot move it. In phase two it
-        does not fall.
-        """
-        stage = self._intake.stage
-        if stage is not None and stage.phase == "two":
-            return self._cfg.phase_two_learning_rate
-        share = 0.0 if stage is None else min(done / stage.max_updates, 1.0)
-        first, last = self._cfg.learning_rate, self._cfg.final_learning_rate
-        return first + share * (last - first)
 
     def _meta_of(
         self,

@@ -86,7 +86,7 @@ class RunLock:
             self.close()
             raise RiposteError(
                 f"{self.path.parent} is in use by process {holder}: "
-                "wait for it, stop it, or choose another folder with --out"
+                "wait for it, stop it, or choose another folder"
             ) from error
         with contextlib.suppress(OSError):  # a full disk: the lock holds without our id in it
             os.ftruncate(descriptor, 0)
