@@ -63,11 +63,13 @@ class Answering:
         return self._researcher(ask)
 
     def tick(self) -> list[Reply]:
-        """Return the answers that have come."""
+        """Return the answers that have come; a robot of a session that is over is disarmed."""
         replies = [Reply(id=id, is_done=True) for id in self._session.ended_asks]
         self._session.ended_asks.clear()
         replies += self._overtaken
         self._overtaken.clear()
+        if self._session.is_over and self._session.heard.mode in MOVING and self._gate_ask is None:
+            self._ask_gate("disarm", "over")
         if self._gate_ask is None or (answered := self._session.errands.take_gate()) is None:
             return replies
         (action, id), self._gate_ask = self._gate_ask, None

@@ -63,6 +63,11 @@ def test_the_policy_changes_between_sections_only_and_nobody_plays_while_one_exp
     assert told["s1-g01-a1"].antagonist == "person"
 
 
+def test_the_robot_is_disarmed_once_the_session_is_over(walked: Stand):
+    assert walked.mode == "disarmed"
+    assert walked.gate_asks == ["check", "arm", "disarm"]
+
+
 def test_the_referee_and_the_journal_tell_the_same_games(walked: Stand):
     stand = walked
     judged = {state.bout: state for state in stand.bouts if state.phase == "finished"}
