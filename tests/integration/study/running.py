@@ -92,7 +92,7 @@ ends = ["least", "most"]
 """
 
 
-def make(folder: Path, protocol: str = SHORT) -> Study:
+def make(folder: Path, protocol: str = SHORT, people: int = 4) -> Study:
     """Make a study with orders, a recorded bat that visits the target, and a recorded heart."""
     clock = SystemClock()
     made = make_study(folder, protocol.encode(), "protocol.toml", "test", clock)
@@ -105,7 +105,7 @@ def make(folder: Path, protocol: str = SHORT) -> Study:
     np.save(folder.with_suffix(".bat.npy"), rows)
     beats = "\n".join(f"{second}.0,{80 + second % 7}" for second in range(60))
     folder.with_suffix(".heart.csv").write_text(f"seconds,beats_per_minute\n{beats}\n")
-    return draw_orders(made.folder, 4, 1, clock)
+    return draw_orders(made.folder, people, 1, clock)
 
 
 class Run:
