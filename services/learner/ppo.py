@@ -20,11 +20,14 @@ from tensordict import TensorDict
 from services.learner.config import LearnerConfig
 from services.learner.devices import RandomState, device_of
 from services.learner.gae import advantages_and_returns
+from services.learner.lean import LeanGaussian, ShuffledStorage, make_lean
 from shared.errors import CheckpointError
 from shared.messages.training import ACTION_DIM, OBS_DIM, Rollout
 from shared.policy.mlp import PolicyWeights
 
 _GROUPS = {"actor": ["policy"], "critic": ["policy"]}
+_LOOKED_AT_AGAIN = 4
+"""Divergence and clipping of an update are measured on every so manieth sample."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,7 +84,7 @@ class PolicyOptimiser:
             cfg.activation,
             obs_normalization=True,
             distribution_cfg={
-                "class_name": "GaussianDistribution",
+                "class_name": LeanGaussian,
                 "init_std": cfg.initial_std,
                 "std_type": "log",
                 "std_range": (cfg.minimum_std, cfg.maximum_std),
@@ -90,6 +93,8 @@ class PolicyOptimiser:
         critic = MLPModel(
             proto, _GROUPS, "critic", 1, cfg.hidden_dims, cfg.activation, obs_normalization=True
         )
+        for model in (actor, critic):
+            make_lean(model.mlp)
         # A last layer 100 times smaller: a fresh policy holds still (Andrychowicz 2021, sec. 3.2).
         with torch.no_grad():
             last = _linear_layers(actor)[-1]
@@ -112,14 +117,20 @@ class PolicyOptimiser:
             schedule="fixed",
             device=str(self._device),
         )
+        parameters = (*algorithm.actor.parameters(), *algorithm.critic.parameters())
+        algorithm.optimizer = torch.optim.Adam(parameters, cfg.learning_rate, fused=True)
         algorithm.train_mode()
         return algorithm
 
     def warm_up(self, rollouts: Sequence[Rollout]) -> None:
         """Teach the normalisers, and nothing else, from these rollouts."""
-        obs = _observations(self._rows(rollouts, "obs"))
-        self._algorithm.actor.update_normalization(obs)
-        self._algorithm.critic.update_normalization(obs)
+        self._normalise(_observations(self._rows(rollouts, "obs")))
+
+    def _normalise(self, obs: TensorDict) -> None:
+        """Move both normalisers: they have always seen the same."""
+        actor, critic = self._algorithm.actor, self._algorithm.critic
+        actor.update_normalization(obs)
+        critic.obs_normalizer.load_state_dict(actor.obs_normalizer.state_dict())
 
     def update(
         self, rollouts: Sequence[Rollout], learning_rate: float | None = None
@@ -153,7 +164,7 @@ class PolicyOptimiser:
             advantages, returns = self._targets(rollouts, values)
             normalised = (advantages - advantages.mean()) / (advantages.std() + 1e-8)
 
-        storage = RolloutStorage("rl", 1, samples, obs[:1], [ACTION_DIM], device=str(self._device))
+        storage = ShuffledStorage("rl", 1, samples, obs[:1], [ACTION_DIM], device=str(self._device))
         storage.observations["policy"] = obs["policy"][:, None]
         storage.actions = actions[:, None]
         storage.values = values[:, None, None]
@@ -173,15 +184,15 @@ class PolicyOptimiser:
             _log_std(algorithm.actor).clamp_(
                 math.log(self.cfg.minimum_std), math.log(self.cfg.maximum_std)
             )
+        some = slice(None, None, _LOOKED_AT_AGAIN)
         with torch.no_grad():
-            algorithm.actor(obs, stochastic_output=True)
-            log_probs = algorithm.actor.get_output_log_prob(actions)
+            algorithm.actor(obs[some], stochastic_output=True)
+            log_probs = algorithm.actor.get_output_log_prob(actions[some])
             new_params = algorithm.actor.output_distribution_params
-            divergence = algorithm.actor.get_kl_divergence((means, stds), new_params)
-            ratio = torch.exp(log_probs - old_log_probs)
+            divergence = algorithm.actor.get_kl_divergence((means[some], stds[some]), new_params)
+            ratio = torch.exp(log_probs - old_log_probs[some])
         algorithm.train_mode()
-        algorithm.actor.update_normalization(obs)
-        algorithm.critic.update_normalization(obs)
+        self._normalise(obs)
         return UpdateStats(
             samples=samples,
             reward_mean=float(np.mean([r.rewards.mean() for r in rollouts])),
