@@ -28,6 +28,8 @@ class SeedCurve:
     x: Sequence[float]
     mean: Sequence[float]
     """Score a bout; NaN where the line is broken."""
+    colour: int | None = None
+    """Of several runs that belong together; each its own where there is none."""
 
     @staticmethod
     def joined(
@@ -72,8 +74,9 @@ def seed_curves(curves: Sequence[SeedCurve], shades: Sequence[Shade], x_label: s
             )  # fmt: skip
         for k, curve in enumerate(curves):
             axes.plot(
-                np.asarray(curve.x), np.asarray(curve.mean), color=LINES[k % len(LINES)],
-                linewidth=1.5, alpha=0.9, label=curve.label,
+                np.asarray(curve.x), np.asarray(curve.mean), linewidth=1.5, alpha=0.9,
+                color=LINES[(k if curve.colour is None else curve.colour) % len(LINES)],
+                label=curve.label or None,
             )  # fmt: skip
         if shades:
             axes.set_xlim(shades[0].start, max(shade.end for shade in shades))
