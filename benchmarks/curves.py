@@ -90,7 +90,7 @@ def _figures() -> list[tuple[str, str, Callable[[dict[str, Any]], float]]]:
     """Return name, form and function of each figure of a run."""
     return [
         *(
-            (f"score in quarter {part + 1} of the samples", ",.0f", partial(_mean_score, part))
+            (f"score in quarter {part + 1} of the curve", ",.0f", partial(_mean_score, part))
             for part in range(PARTS)
         ),
         ("share of the steps in the target, at the end", ".3f", itemgetter("in_target_share")),
@@ -99,11 +99,14 @@ def _figures() -> list[tuple[str, str, Callable[[dict[str, Any]], float]]]:
 
 
 def _mean_score(part: int, run: dict[str, Any]) -> float:
-    """Return the mean score of the bouts that ended within a part of the samples."""
-    samples = np.array([point["samples"] for point in run["curve"]])
+    """Return the mean score of the bouts that ended within a part of a curve.
+
+    A curve begins where the first bout from start to end has ended.
+    """
+    samples = np.array([point["samples"] for point in run["curve"]], np.float64)
     scores = np.array([point["score"] for point in run["curve"]])
-    width = samples[-1] / PARTS
-    return float(scores[(samples > part * width) & (samples <= (part + 1) * width)].mean())
+    places = (samples - samples[0]) / (samples[-1] - samples[0]) * PARTS
+    return float(scores[np.minimum(places.astype(int), PARTS - 1) == part].mean())
 
 
 def picture(before: Sequence[dict[str, Any]], after: Sequence[dict[str, Any]]) -> bytes:

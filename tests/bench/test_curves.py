@@ -26,7 +26,7 @@ def test_curves_that_differ_no_more_than_seeds_do_are_the_same(tmp_path: Path, c
     assert figure.read_bytes().startswith(b"\x89PNG")
     said = capsys.readouterr().out
     # the first quarter holds k = 1 .. 25, of mean 13: 11 * 13 + 1 at gain 11 and seed 1
-    assert "| score in quarter 1 of the samples | 144 [109, 179] | 144 [142, 146] | 0 [" in said
+    assert "| score in quarter 1 of the curve | 144 [109, 179] | 144 [142, 146] | 0 [" in said
 
 
 def test_a_change_that_every_seed_shows_is_found():
