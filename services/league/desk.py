@@ -109,14 +109,14 @@ class Desk:
             SnapshotError: it can never be entered; says why.
             RiposteError: it cannot be stored, or the ledger cannot be read, now.
         """
-        known = self._state.versions[report.agent].get(report.policy_version)
-        if known is not None:
-            if known.snapshot == report.snapshot:
+        known = self._journal.snapshot_of(report.agent, report.policy_version)
+        if known:
+            if known == report.snapshot:
                 self.counters["repeated_versions"] += 1
                 return self._receipt(report)
             reason = (
                 f"version {report.policy_version} of {report.agent} is in the ledger as snapshot "
-                f"{known.snapshot[:12]}, not {report.snapshot[:12]}; use a number after the latest"
+                f"{known[:12]}, not {report.snapshot[:12]}; use a number after the latest"
             )
             self.counters["conflicting_versions"] += 1
             log.warning("version_conflicted", agent=report.agent, reason=reason)
@@ -218,9 +218,9 @@ class Desk:
             stage=schedule.stage_now(self._state),
             learned_elsewhere=tuple(
                 name
-                for version in self._state.versions[report.agent].values()
-                if version.version >= report.policy_version and version.snapshot != report.snapshot
-                for name in self._journal.rollouts_behind(version.agent, version.version)
+                for version, snapshot in self._journal.since(report.agent, report.policy_version)
+                if snapshot != report.snapshot
+                for name in self._journal.rollouts_behind(report.agent, version)
             ),
             reason=reason,
         )

@@ -68,8 +68,10 @@ class LeaseRecord:
 
 @dataclasses.dataclass
 class RunState:
-    """Everything the ledger says about a run."""
+    """What the ledger says about a run: everything, or only what a running league needs."""
 
+    remembers: int | None = dataclasses.field(default=None, compare=False)
+    """At least so many of a stage's newest versions and points; None: all. The ledger has them."""
     position: int = 0
     """Sequence number of the last event applied."""
     last_at_ns: int = 0
@@ -87,6 +89,12 @@ class RunState:
         default_factory=lambda: {agent: {} for agent in AGENTS}
     )
     """By agent and number, in the order they came."""
+    newest: dict[Agent, VersionRecord] = dataclasses.field(
+        default_factory=dict[Agent, VersionRecord]
+    )
+    """By agent, the version with the highest number."""
+    forgotten: dict[Agent, int] = dataclasses.field(default_factory=dict[Agent, int])
+    """By agent, the highest number of a version that is not held any more."""
     evaluations: dict[tuple[str, str], EvaluationRecord] = dataclasses.field(
         default_factory=dict[tuple[str, str], EvaluationRecord]
     )
@@ -115,9 +123,14 @@ class RunState:
     """Samples each agent has learned from."""
 
     @classmethod
-    def fold(cls, entries: Iterable[Entry]) -> "RunState":
-        """Return the state after these events."""
-        state = cls()
+    def fold(cls, entries: Iterable[Entry], remembers: int | None = None) -> "RunState":
+        """Return the state after these events.
+
+        Args:
+            entries: the events, oldest first.
+            remembers: at least so many of a stage's versions are kept; None: all.
+        """
+        state = cls(remembers=remembers)
         for entry in entries:
             state.apply(entry)
         return state
@@ -170,12 +183,11 @@ class RunState:
 
     def latest(self, agent: Agent) -> VersionRecord | None:
         """Return the version of an agent with the highest number, None before version 0."""
-        versions = self.versions[agent]
-        return versions[max(versions)] if versions else None
+        return self.newest.get(agent)
 
     def latest_version(self, agent: Agent) -> int:
         """Return the highest version number of an agent, -1 before version 0."""
-        return max(self.versions[agent], default=-1)
+        return self.newest[agent].version if agent in self.newest else -1
 
     def stage_ends(self, agent: Agent, round: int | None = None) -> list[StageRecord]:
         """Return the ended stages in which an agent learned, oldest first.
@@ -279,13 +291,26 @@ class RunState:
             at_ns=at_ns,
         )
         if event.stage >= 0:
-            self.stages[event.stage].versions.append(record)
-            self.stages[event.stage].restarts += not event.rollouts
-        self.versions[event.agent][event.version] = record
+            stage = self.stages[event.stage]
+            stage.add(record)
+            stage.restarts += not event.rollouts
+        self.versions[record.agent][event.version] = record
+        if event.version > self.latest_version(record.agent):
+            self.newest[record.agent] = record
         if event.metrics is not None:
             self.total_samples[event.agent] = event.metrics.total_samples
         for name in set(event.rollouts):
             self.repeated_rollouts += not self.rollout_names.add(name)
+        if event.stage >= 0:
+            self._forget(self.stages[event.stage])
+
+    def _forget(self, record: StageRecord) -> None:
+        """Let go of a stage's oldest versions, half of them at a time."""
+        if self.remembers is not None and len(record.versions) >= 2 * self.remembers:
+            for old in record.forget(self.remembers):
+                self.versions[old.agent].pop(old.version, None)
+                known = self.forgotten.get(old.agent, -1)
+                self.forgotten[old.agent] = max(known, old.version)
 
     def _lease_granted(self, event: events.LeaseGranted, at_ns: int) -> None:
         self.leases[event.lease] = LeaseRecord(grant=event, granted_at_ns=at_ns)

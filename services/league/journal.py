@@ -13,6 +13,10 @@ from shared.messages.training import Agent
 
 RETRY_SECONDS = 0.5
 """After the ledger failed, it is left alone this long before it is tried again."""
+REMEMBERED = 256
+"""Versions of a stage that the state holds at least; an endless stage would fill the memory."""
+REMEMBERED_WINDOWS = 3
+"""The same, in windows of the test for convergence, which looks at two."""
 
 log = structlog.get_logger()
 
@@ -42,8 +46,9 @@ class Journal:
         self._clock = clock
         self._retry_at = 0.0
         self._ledger = Ledger(path)
+        self._remembers = max(REMEMBERED, REMEMBERED_WINDOWS * start.config.convergence_window)
         try:
-            self.state = self._replay()
+            self.state = self._replay(self._remembers)
             if self.state.position:
                 _check_same_run(path, self.state, start)
             elif may_start:
@@ -92,7 +97,7 @@ class Journal:
         if self._clock.now() < self._retry_at:
             return False
         try:
-            self.state = self._replay()
+            self.state = self._replay(self._remembers)
             self._ledger.check_writable()
         except LedgerError as error:
             self._fail(error)
@@ -108,7 +113,7 @@ class Journal:
             LedgerError: the ledger ends before it, or cannot be written.
         """
         self._ledger.rewind(position)
-        self.state = self._replay()
+        self.state = self._replay(self._remembers)
 
     def rollouts_behind(self, agent: Agent, version: int) -> tuple[str, ...]:
         """Return the names of the rollouts that a version of the state was made from.
@@ -116,10 +121,37 @@ class Journal:
         Raises:
             LedgerError: the ledger cannot be read now.
         """
+        event = self._entered(agent, version)
+        return event.rollouts if event is not None else ()
+
+    def snapshot_of(self, agent: Agent, version: int) -> str:
+        """Return the content hash of a version, empty where there is none of that number.
+
+        Raises:
+            LedgerError: the ledger cannot be read now.
+        """
+        if (record := self.state.versions[agent].get(version)) is not None:
+            return record.snapshot
+        if version > self.state.forgotten.get(agent, -1):
+            return ""
+        event = self._entered(agent, version)
+        return event.snapshot if event is not None else ""
+
+    def since(self, agent: Agent, version: int) -> list[tuple[int, str]]:
+        """Return number and content hash of an agent's versions from this number on.
+
+        Raises:
+            LedgerError: the ledger cannot be read now.
+        """
+        records = list(self.state.versions[agent].values())
+        if version <= self.state.forgotten.get(agent, -1):
+            records += self._replay(None).versions[agent].values()
+        return sorted({(r.version, r.snapshot) for r in records if r.version >= version})
+
+    def _entered(self, agent: Agent, version: int) -> VersionEntered | None:
         key = f"{agent}:{version}"
         new = [e for e in self.uncommitted if isinstance(e, VersionEntered) and e.key == key]
-        event = new[0] if new else self._ledger.find(VersionEntered, key)
-        return event.rollouts if event is not None else ()
+        return new[0] if new else self._ledger.find(VersionEntered, key)
 
     def close(self) -> None:
         """Close the ledger."""
@@ -132,9 +164,9 @@ class Journal:
         self.failures += 1
         self._retry_at = self._clock.now() + RETRY_SECONDS
 
-    def _replay(self) -> RunState:
+    def _replay(self, remembers: int | None) -> RunState:
         try:
-            return RunState.fold(self._ledger.replay())
+            return RunState.fold(self._ledger.replay(), remembers)
         except ValueError as error:
             raise LedgerError(
                 f"ledger {self._ledger.path} is damaged: {error}; "

@@ -100,11 +100,32 @@ class StageRecord:
     restarts: int = 0
     """How many of the versions were made from no rollout: the learner went back to an earlier
     policy."""
+    samples: int = 0
+    """Learned from in this stage."""
+    newest: VersionRecord | None = None
+    """Of the versions the one with the highest number."""
+    forgotten: int = 0
+    """How many of the oldest versions are not in the list any more."""
 
     @property
     def updates(self) -> int:
         """Return how many updates were made in this stage."""
-        return len(self.versions) - self.restarts
+        return self.forgotten + len(self.versions) - self.restarts
+
+    def add(self, record: VersionRecord) -> None:
+        """Take in the next version made in this stage."""
+        self.versions.append(record)
+        self.samples += record.metrics.samples if record.metrics is not None else 0
+        if self.newest is None or record.version > self.newest.version:
+            self.newest = record
+
+    def forget(self, count: int) -> list[VersionRecord]:
+        """Let go of the oldest versions, and of the points before the others; return them."""
+        gone = self.versions[:count]
+        del self.versions[:count]
+        del self.points[: -len(self.versions)]
+        self.forgotten += len(gone)
+        return gone
 
     @property
     def end_ref(self) -> str:
@@ -117,8 +138,3 @@ class StageRecord:
         stage = self.stage
         number = f"{stage.round}.{stage.iteration}" if stage.round else f"{stage.iteration}"
         return f"{stage.agent} {number}"
-
-    @property
-    def samples(self) -> int:
-        """Return the samples learned from in this stage."""
-        return sum(version.metrics.samples for version in self.versions if version.metrics)

@@ -104,7 +104,8 @@ def stage_start(cfg: LeagueConfig, state: RunState) -> StageStarted | None:
 
 def stage_end(cfg: LeagueConfig, record: StageRecord) -> StageEnded | None:
     """Return the end of the stage that runs, None while it goes on."""
-    if not record.versions:
+    last = record.newest
+    if last is None:
         return None
     if record.updates >= record.stage.max_updates:
         reason = "budget"
@@ -114,7 +115,6 @@ def stage_end(cfg: LeagueConfig, record: StageRecord) -> StageEnded | None:
         reason = "converged"
     else:
         return None
-    last = max(record.versions, key=lambda version: version.version)
     return StageEnded(
         stage=record.stage.index, reason=reason, version=last.version, snapshot=last.snapshot
     )
