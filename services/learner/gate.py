@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from shared.bus.ranges import LARGEST, Ranges
+from services.learner.played import Played
+from shared.bus.ranges import LARGEST
 from shared.messages.league import LeaseSummary, Stage
 from shared.messages.training import ACTION_DIM, Agent, Rollout
 
@@ -14,8 +15,6 @@ _LOG_PROB_TOLERANCE = 1e-2
 _STD_RANGE = (1e-4, 100.0)
 _FARTHEST = 1e6
 """Of any number to learn from: squares of larger ones would soon be infinite."""
-MOST_STRETCHES = 1 << 14
-"""Of one lease, with gaps between them; 16 bytes each."""
 
 
 class Decision(enum.Enum):
@@ -112,8 +111,6 @@ def check_contents(rollout: Rollout, bout_steps: int) -> Ruling:
         return _drop(f"empty: {steps} steps of {worlds} bouts")
     if len(np.unique(rollout.bouts)) != worlds or rollout.bouts.min() < 0:
         return _drop("a bout stands in two worlds, or has a negative number")
-    if rollout.bouts.max() >= LARGEST // bout_steps:
-        return _drop(f"bout {rollout.bouts.max()} is no count")
     last = rollout.first_step.astype(np.int64) + steps
     if rollout.first_step.min() < 0 or last.max() > bout_steps:
         return _drop(f"a bout runs outside its {bout_steps} steps")
@@ -134,49 +131,16 @@ def check_contents(rollout: Rollout, bout_steps: int) -> Ruling:
     return LEARN
 
 
-def stretches_of(rollout: Rollout, bout_steps: int) -> list[tuple[int, int]]:
-    """Return what play of its lease a rollout is of, by world: its first and its last step.
+def check_new(rollout: Rollout, played: Played) -> Ruling:
+    """Return whether a rollout is of play that no other rollout was of.
 
-    Steps are counted from the first of bout 0 on, through all bouts of the lease: bouts follow each
-    other, so what was played without a gap is one range of numbers, however long it is.
+    What was played is remembered while the lease lives and this process does.
 
     Args:
         rollout: its contents already checked.
-        bout_steps: control steps of a bout.
+        played: what was handed over before under the same lease.
     """
-    steps = len(rollout.rewards)
-    firsts = rollout.bouts * bout_steps + rollout.first_step
-    return [(first, first + steps - 1) for first in firsts.tolist()]
-
-
-def check_new(stretches: list[tuple[int, int]], seen: Ranges, bout_steps: int) -> Ruling:
-    """Return whether a rollout is of stretches of play that no other rollout was of.
-
-    Under a name of its own an old rollout would count again. Stretches are remembered while the
-    lease lives and this process does.
-
-    Args:
-        stretches: of the rollout, as ``stretches_of`` returns them.
-        seen: those of the rollouts that were held before under the same lease.
-        bout_steps: control steps of a bout.
-    """
-    for first, last in stretches:
-        if seen.overlaps(first, last):
-            bout, step = divmod(first, bout_steps)
-            return _drop(f"replayed: bout {bout} from step {step} on was handed over before")
-    return LEARN
-
-
-def remember(stretches: list[tuple[int, int]], seen: Ranges) -> None:
-    """Enter stretches of play among those that were held.
-
-    What was never held leaves gaps. The oldest count as held where there are ``MOST_STRETCHES``.
-
-    Args:
-        stretches: of a rollout, as ``stretches_of`` returns them.
-        seen: of its lease; changed in place.
-    """
-    for first, last in stretches:
-        seen.cover(first, last)
-    while len(seen) > MOST_STRETCHES:
-        seen.close_first_gap()
+    if (known := played.known(rollout)) is None:
+        return LEARN
+    bout, step = known
+    return _drop(f"replayed: bout {bout} from step {step} on was handed over before")

@@ -16,12 +16,11 @@ from services.learner.gate import (
     check_new,
     check_provenance,
     check_version,
-    remember,
-    stretches_of,
 )
+from services.learner.played import Played
 from shared.bus.base import Inbox, Request
 from shared.bus.delivery import Applied
-from shared.bus.ranges import LARGEST, Ranges
+from shared.bus.ranges import LARGEST
 from shared.clock import Clock
 from shared.game.rules import RuleBook
 from shared.messages.league import Leases, LeaseSummary, Schedule, Stage
@@ -82,8 +81,8 @@ class Intake:
         self._gathered: list[Held] = []
         self._committing: list[Held] = []
         self._first_refused_at: dict[str, float] = {}
-        self._seen: dict[str, Ranges] = {}
-        """By lease, the stretches of play that were held."""
+        self._played: dict[str, Played] = {}
+        """By lease, the play that was held."""
 
     @property
     def in_turn(self) -> bool:
@@ -114,7 +113,7 @@ class Intake:
     def know(self, leases: Leases) -> None:
         """Take over whose rollouts may be learned from."""
         self._leases = {lease.lease: lease for lease in leases.leases}
-        self._seen = {name: seen for name, seen in self._seen.items() if name in self._leases}
+        self._played = {k: played for k, played in self._played.items() if k in self._leases}
 
     def end_stage(self) -> None:
         """The league has ended the stage; what comes next it will say."""
@@ -206,7 +205,7 @@ class Intake:
         ruling = self._rule(rollout, version)
         if ruling.decision is Decision.LEARN:
             self._first_refused_at.pop(rollout.lease, None)
-            remember(self._stretches(rollout), self._seen.setdefault(rollout.lease, Ranges()))
+            self._played.setdefault(rollout.lease, Played()).add(rollout)
             self._gathered.append((request, rollout))
         elif ruling.decision is Decision.LATER and not self._is_too_late(rollout.lease):
             request.refuse(ruling.reason, retry=True)
@@ -225,12 +224,8 @@ class Intake:
         if ruling.decision is Decision.LEARN:
             ruling = check_contents(rollout, self._rules.bout_steps)
         if ruling.decision is Decision.LEARN:
-            seen = self._seen.get(rollout.lease, Ranges())
-            ruling = check_new(self._stretches(rollout), seen, self._rules.bout_steps)
+            ruling = check_new(rollout, self._played.get(rollout.lease, Played()))
         return ruling
-
-    def _stretches(self, rollout: Rollout) -> list[tuple[int, int]]:
-        return stretches_of(rollout, self._rules.bout_steps)
 
     def _oldest(self, version: int) -> int:
         """Return the oldest version accepted; version 0 acted without a normaliser."""

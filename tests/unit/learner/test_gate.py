@@ -9,17 +9,15 @@ import numpy as np
 import pytest
 
 from services.learner.gate import (
-    MOST_STRETCHES,
     Decision,
     check_contents,
     check_new,
     check_provenance,
     check_version,
-    remember,
-    stretches_of,
 )
-from shared.bus.ranges import Ranges
+from services.learner.played import KEPT_BOUTS, Played
 from shared.messages.league import LeaseSummary, Stage
+from shared.messages.training import Rollout
 from tests.unit.learner.making import BOUT_STEPS, MODEL, rollout
 
 STAGE = Stage(
@@ -126,7 +124,6 @@ def changed(field: str, at: Any, value: Any) -> dict[str, Any]:
     [
         (changed("bouts", 1, 0), "a bout stands in two worlds"),
         (changed("bouts", 1, -4), "negative number"),
-        (changed("bouts", 1, np.iinfo(np.int64).max), "is no count"),
         (changed("first_step", 0, -8), "runs outside its 80 steps"),
         (changed("first_step", 0, 79), "runs outside its 80 steps"),
         (changed("first_step", 0, np.iinfo(np.int32).max), "runs outside its 80 steps"),
@@ -176,44 +173,46 @@ def test_rounding_of_honest_log_probabilities_is_forgiven():
         assert check_contents(sample, BOUT_STEPS).decision is Decision.LEARN
 
 
-def played(rollouts: int, worlds: int = 64, steps: int = 8) -> Iterator[list[tuple[int, int]]]:
-    """The stretches of a lease: bouts begin staggered, and follow each other in every world."""
-    first = np.arange(worlds) % (BOUT_STEPS // steps) * steps
+def played(rollouts: int, worlds: int, steps: int = 8) -> Iterator[Rollout]:
+    """The rollouts of a lease: bouts begin staggered, and follow each other in every world."""
+    plain = rollout(worlds=worlds, steps=steps)
+    first = np.arange(worlds) * (BOUT_STEPS // steps) // worlds * steps
     bouts, following = np.arange(worlds), worlds
     for _ in range(rollouts):
-        yield [(at, at + steps - 1) for at in (bouts * BOUT_STEPS + first).tolist()]
+        yield msgspec.structs.replace(plain, bouts=bouts.copy(), first_step=first.astype(np.int32))
         first = first + steps
         for world in np.flatnonzero(first == BOUT_STEPS):
             bouts[world], first[world], following = following, 0, following + 1
 
 
 def test_what_was_handed_over_before_is_not_new_whatever_part_of_it():
-    stretches = stretches_of(rollout(), BOUT_STEPS)
-    seen = Ranges()
-    assert check_new(stretches, seen, BOUT_STEPS).decision is Decision.LEARN
-    remember(stretches[3:4], seen)
-    first, last = stretches[3]
-    for again in ((first, last), (last, last + 7), (first - 7, first), (first + 2, first + 3)):
-        ruling = check_new([stretches[0], again], seen, BOUT_STEPS)
-        assert ruling.reason.startswith("replayed: bout")
-    assert check_new([(last + 1, last + 8)], seen, BOUT_STEPS).decision is Decision.LEARN
+    one = rollout(worlds=8)
+    before = Played()
+    assert check_new(one, before).decision is Decision.LEARN
+    before.add(one)
+    for shift in (-7, -1, 0, 3, 7):
+        again = msgspec.structs.replace(one, first_step=one.first_step + np.int32(shift))
+        assert check_new(again, before).reason.startswith("replayed: bout")
+    following = msgspec.structs.replace(one, first_step=one.first_step + np.int32(8))
+    assert check_new(following, before).decision is Decision.LEARN
 
 
-def test_a_lease_that_lives_for_days_is_remembered_in_a_few_numbers():
-    seen = Ranges()
-    for stretches in played(3000):
-        assert check_new(stretches, seen, BOUT_STEPS).decision is Decision.LEARN
-        remember(stretches, seen)
-    assert len(seen) <= 2 * 64
-    for stretches in itertools.islice(played(3000), 0, None, 500):
-        assert check_new(stretches, seen, BOUT_STEPS).decision is Decision.DROP
-
-
-def test_gaps_do_not_fill_the_memory():
-    seen = Ranges()
-    for number in range(MOST_STRETCHES + 100):
-        remember([(2 * number, 2 * number)], seen)
-    assert len(seen) == MOST_STRETCHES
-    assert seen.overlaps(1, 1)  # the oldest gap counts as handed over
-    newest = 2 * (MOST_STRETCHES + 99)
-    assert not seen.overlaps(newest - 1, newest - 1)
+@pytest.mark.parametrize("worlds", [8, 96])
+@pytest.mark.parametrize("lost", [0.0, 0.4])
+def test_a_lease_that_lives_for_days_takes_no_more_memory_and_loses_nothing(
+    worlds: int, lost: float
+):
+    before, dice = Played(), np.random.default_rng(3)
+    late: list[Rollout] = []
+    for number, each in enumerate(played(400, worlds)):
+        if dice.random() < lost:  # dropped as stale, never handed over again; or a little late
+            late = [*late, each][-6:] if number % 2 else late
+            continue
+        for one in (each, *late):
+            assert check_new(one, before).decision is Decision.LEARN
+            before.add(one)
+        late = []
+        assert len(before) <= KEPT_BOUTS * worlds
+    for each in itertools.islice(played(400, worlds), 0, None, 50):
+        assert check_new(each, before).decision is Decision.DROP or lost
+    assert check_new(next(played(1, worlds)), before).decision is Decision.DROP
