@@ -90,10 +90,8 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
             StudyError: there is no key.
         """
         if self.key is None:
-            raise StudyError(
-                f"{self.folder} has no {KEY}: draw the orders with `riposte study allocate`, "
-                "or put the key back"
-            )
+            what = "put the key back" if self.assignments else "draw the orders: `study allocate`"
+            raise StudyError(f"{self.folder} has no {KEY}: {what}")
         return {label: entry.condition for label, entry in self.key.label.items()}
 
     def labels_of(self, participant: str) -> tuple[str, ...]:

@@ -27,7 +27,7 @@ from shared.study.rows import (
     QuestionnaireRow,
     RankingRow,
 )
-from shared.study.steps import Step
+from shared.study.steps import Step, steps_of
 from shared.study.tsv import write_table
 
 EVENTS: Final = "events.tsv"
@@ -225,7 +225,9 @@ def rows_of(study: Study, participant: str, session: int = 1) -> SessionRows | N
             f"{','.join(began.order)}; expected {participant}, session {session}, order "
             f"{','.join(expected[2])} (allocation.tsv): put back what was there"
         )
-    return SessionRows(study.protocol, study.steps_of(participant), events)
+    # In any order: rows hold none of what an order tells of a step, and an analysis has no key.
+    steps = steps_of(study.protocol, [each.name for each in study.protocol.condition])
+    return SessionRows(study.protocol, steps, events)
 
 
 def write_session(study: Study, participant: str, session: int = 1) -> None:

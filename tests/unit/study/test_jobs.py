@@ -3,6 +3,7 @@
 import csv
 import importlib.util
 import io
+import shutil
 from pathlib import Path
 
 import pytest
@@ -104,6 +105,37 @@ def test_an_export_is_blinded_unless_asked_otherwise(played, tmp_path, capsys):
     assert games[1]["policy"].startswith("sha256:")
     words = {row["text"] for row in table(tmp_path / "open" / "questionnaire.csv")}
     assert {"my\town\nwords", 'said "n/a"; then\t\\n'} <= words
+
+
+@pytest.fixture
+def keyless(played, tmp_path):
+    """A copy of the study from which the key was taken away, whose tables lag behind."""
+    folder = tmp_path / "keyless"
+    shutil.copytree(played.folder, folder, ignore=shutil.ignore_patterns("key.toml"))
+    for path in folder.glob("sub-*/ses-*/*.tsv"):
+        if path.name != "hr.tsv":
+            path.unlink()
+    return folder
+
+
+def test_without_the_key_a_study_is_checked_and_exported_as_with_it(
+    played, keyless, tmp_path, capsys
+):
+    said = run(capsys, "check", keyless)
+    assert "key.toml is elsewhere" in said
+    assert "error" not in said
+    run(capsys, "export", keyless, "--out", tmp_path / "without")
+    run(capsys, "export", played.folder, "--out", tmp_path / "with")
+    for path in (tmp_path / "with").iterdir():
+        assert (tmp_path / "without" / path.name).read_bytes() == path.read_bytes(), path.name
+    for path in played.folder.glob("**/*.tsv"):
+        assert (keyless / path.relative_to(played.folder)).read_bytes() == path.read_bytes()
+
+
+def test_without_the_key_a_study_is_analysed_and_what_needs_it_says_so(keyless, capsys):
+    assert "files in" in run(capsys, "analyse", keyless)
+    for words in (["analyse", keyless], ["export", keyless, "--out", keyless.parent / "open"]):
+        assert "put the key back" in run(capsys, *words, "--unblind", code=2)
 
 
 def test_an_export_into_a_folder_that_holds_something_is_refused(played, tmp_path, capsys):
