@@ -4,6 +4,9 @@ Nothing here knows the bus, the journal or a page: `Session` carries out what is
 """
 
 import math
+import re
+from collections.abc import Iterable
+from pathlib import PurePath
 from typing import Final, Literal
 
 import msgspec
@@ -30,6 +33,10 @@ STATIC: Final = "scripted:static"
 """Who plays while a person explores: nobody."""
 UNHEARD_SECONDS: Final = 5.0
 """A bout that was asked for and of which the referee says nothing for so long, is none (s)."""
+PLAYER: Final = "this section's player"
+"""What the researcher reads in place of a player's name."""
+_HASH: Final = re.compile(r"(sha256:)?\b[0-9a-f]{12,64}\b")
+"""Of a snapshot, whole or shortened as messages do."""
 AGAIN_SECONDS: Final = 1.0
 """From a request that was refused to the next try (s)."""
 
@@ -198,6 +205,21 @@ def player_of(step: Step) -> str:
     return STATIC if step.kind == "explore" else step.player
 
 
+def unnamed(text: str, names: Iterable[str]) -> str:
+    """Return a text in which no player is named, for people who must not know who plays.
+
+    Args:
+        text: such as why a player could not be loaded.
+        names: what the player may be called in it: words, references or paths.
+    """
+    known = {name for name in names if name}
+    known |= {name.rpartition(":")[2] for name in known}
+    known |= {PurePath(name).stem for name in known}
+    for name in sorted(known, key=len, reverse=True):
+        text = re.sub(rf"(?<!\w){re.escape(name)}(?!\w)", PLAYER, text)
+    return _HASH.sub(PLAYER, text)
+
+
 def _unarmed(mode: str, reason: str) -> str:
     if mode == "ramping":
         return "the robot to be up to speed"
@@ -227,7 +249,7 @@ def _ready(step: Step, moment: Moment, heard: Heard, now: float, terms: Terms) -
         return Wait("the policy")
     if moment.loaded != player_of(step):
         if now < moment.retry_at:
-            return Wait(f"the policy to be {player_of(step)}: {moment.trouble}")
+            return Wait(f"the policy to be {PLAYER}: {moment.trouble}")
         return Load(player_of(step))
     return Start() if step.kind == "explore" else Turn("countdown", terms.countdown)
 

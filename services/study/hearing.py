@@ -98,10 +98,13 @@ class Hearing:
         return self._known(beats, now)
 
     def services(self) -> tuple[tuple[str, bool, str], ...]:
-        """Return name, whether it is well, and state of every process heard so far."""
+        """Return name, whether it is well, and state of every process heard so far.
+
+        The researcher's page shows them: what a policy says of itself names its player.
+        """
         now = self._clock.now()
         return tuple(
-            (name, now - at <= STATUS_SILENCE, status.waiting_for or status.state)
+            (name, now - at <= STATUS_SILENCE, _blinded(status))
             for name, (at, status) in sorted(self._statuses.items())
         )
 
@@ -137,3 +140,10 @@ class Hearing:
             has_policy=any("antagonist" not in name for name in self._bus.alive("policy")),
             has_recorder=bool(self._bus.alive("recorder")),
         )
+
+
+def _blinded(status: ServiceStatus) -> str:
+    """Return what a process does, without the words of a policy."""
+    if status.role == "policy":
+        return "waits" if status.waiting_for else "ready"
+    return status.waiting_for or status.state

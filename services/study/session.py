@@ -24,6 +24,7 @@ from services.study.course import (
     Turn,
     Wait,
     next_action,
+    unnamed,
 )
 from services.study.errands import Errands
 from services.study.hearing import Heard
@@ -339,9 +340,11 @@ class Session:
                     self.moment, loaded=self._asked_player, reference=player.player, trouble=""
                 )
             else:
-                self.moment = replace(
-                    self.moment, trouble=" ".join(player.lines), retry_at=now + AGAIN_SECONDS
-                )
+                asked = self._asked_player
+                names = (asked, self.plan.players.get(asked, ""), player.player)
+                why = unnamed(" ".join(player.lines), names)  # the log has the policy's words
+                log.warning("player_refused", player=asked, reasons=list(player.lines))
+                self.moment = replace(self.moment, trouble=why, retry_at=now + AGAIN_SECONDS)
         if bout is not None:
             self._take_bout(step, is_accepted=bout.is_accepted, is_known=bout.is_known,
                             reason=" ".join(bout.lines), now=now)  # fmt: skip

@@ -28,6 +28,7 @@ from shared.bus.memory import MemoryHub
 from shared.clock import ManualClock
 from shared.game.bout import Scoreboard
 from shared.game.rules import RuleBook
+from shared.messages.live import ServiceStatus
 from shared.messages.play import (
     BatStates,
     GateReply,
@@ -36,7 +37,7 @@ from shared.messages.play import (
     PlayerReply,
     RefereeState,
 )
-from shared.messages.topics import ARM, BATS, GATE, HEART_RATE, PLAYER, REFEREE
+from shared.messages.topics import ARM, BATS, GATE, HEART_RATE, PLAYER, REFEREE, STATUS
 from shared.sim.arena import bat_of, target_of
 from shared.sim.config import SimConfig
 from shared.study.drawing import draw_orders
@@ -161,6 +162,7 @@ class Stand:
         self.is_robot_silent = False
         self.rate: float | None = 80.0
         self.refused_player = ""
+        self.policy_waits_for = ""
         self.loaded: list[str] = []
         self.gate_asks: list[str] = []
         self.tick_count = 0
@@ -222,9 +224,21 @@ class Stand:
                 is_fine = name != self.refused_player
                 if is_fine:
                     self.loaded.append(name)
-                reason = "" if is_fine else "there is no such player"
+                reason = "" if is_fine else f"there is no such player: {name!r}"
                 asked.reply(PlayerReply(accepted=is_fine, player=name, reason=reason))
             self._answer_gate()
+            self._say_how_the_policy_is()
+
+    def _say_how_the_policy_is(self) -> None:
+        """As `services.policy` does every second, who plays included."""
+        if self.tick_count % 100:
+            return
+        named = self.loaded[-1] if self.loaded else "scripted:static"
+        self._policy.publish(STATUS, ServiceStatus(
+            role="policy", name="policy-protagonist", boot=self._policy.boot, pid=1, host="here",
+            state=f"{named} plays as protagonist", waiting_for=self.policy_waits_for,
+            last_error=f"{named} was late",
+        ), role="policy", name="policy-protagonist")  # fmt: skip
 
     def _robot(self) -> None:
         self.tick_count += 1

@@ -145,16 +145,37 @@ def test_a_participant_may_do_nothing_but_fill_in_what_is_asked(stand: Stand):
     assert stand.pages.participant.score == stand.whats("game_ended")[-1].score
 
 
-def test_no_page_of_the_participant_names_a_condition_or_a_player(stand: Stand):
-    seen: list[str] = []
-    for _ in range(2000):
+def test_no_page_names_a_condition_or_a_player(stand: Stand):
+    participant, researcher = "", ""
+    for count in range(2000):
         if stand.session.is_over:
             break
         stand.tick()
+        if count == 20:
+            stand.policy_waits_for = "a referee for scripted:heuristic"
         stand.help_on()
-        seen.append(repr(stand.pages.participant))
-    text = "".join(seen)
-    assert not [word for word in ("easy", "hard", "scripted", "sha256") if word in text]
+        participant += repr(stand.pages.participant)
+        researcher += repr(stand.pages.researcher)
+    words = ("easy", "hard", "guard", "heuristic", "scripted", "sha256")
+    assert not [word for word in words if word in participant]
+    assert not [word for word in words if word in researcher]
+    services = {each.name: each.state for each in stand.pages.researcher.services}
+    assert services["policy-protagonist"] == "waits"
+    assert "state='ready'" in researcher
+
+
+def test_a_player_that_cannot_be_loaded_is_not_named_to_the_researcher(stand: Stand):
+    stand.walk("s2-g01")
+    stand.refused_player = "scripted:heuristic"
+    stand.arm()
+    stand.ask("begin")
+    stand.tick(2.0)
+    page = stand.pages.researcher
+    assert page.waiting_for == (
+        "the policy to be this section's player: there is no such player: 'this section's player'"
+    )
+    assert "heuristic" not in repr(page)
+    assert "heuristic" not in repr(stand.study.health())
 
 
 def test_a_step_may_be_left_early_by_the_researcher(stand: Stand):

@@ -9,6 +9,7 @@ from msgspec.structs import replace
 
 from services.study.course import (
     PAUSED,
+    PLAYER,
     Begin,
     End,
     Finish,
@@ -20,6 +21,7 @@ from services.study.course import (
     Turn,
     Wait,
     next_action,
+    unnamed,
 )
 from services.study.hearing import Heard
 from shared.messages.play import GateState, HeartRate, RefereeState
@@ -108,6 +110,22 @@ def test_who_explores_needs_no_armed_robot_and_no_recorder():
     assert act(EXPLORE, moment, heard) == Start()
     running = replace(heard, referee=said("running", PLAYING.bout))
     assert act(EXPLORE, PLAYING, running) == Wait("")
+
+
+def test_what_a_player_cannot_be_loaded_for_is_said_without_its_name():
+    refused = replace(READY, loaded="", trouble="the file is gone", retry_at=12.0)
+    assert act(GAME, refused) == Wait("the policy to be this section's player: the file is gone")
+    names = ("style-1", "/data/league/style-1.safetensors", "scripted:guard", "")
+    digest = "0123456789ab" * 5 + "0123"
+    text = (
+        "cannot read /data/league/style-1.safetensors; no player 'style-1'; it has style-10; "
+        f"guard and scripted:guard; guarded; snapshot sha256:{digest} is not {digest[:12]}"
+    )
+    one = PLAYER
+    assert unnamed(text, names) == (
+        f"cannot read {one}; no player '{one}'; it has style-10; "
+        f"{one} and {one}; guarded; snapshot {one} is not {one}"
+    )
 
 
 def test_a_bout_is_followed_to_its_end():
