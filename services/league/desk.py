@@ -18,6 +18,7 @@ from services.league.events import (
 )
 from services.league.history import RunState
 from services.league.journal import Journal
+from services.league.names import Names
 from services.league.progress import describe
 from services.league.snapshots import SnapshotStore
 from shared.clock import Clock
@@ -31,6 +32,7 @@ from shared.messages.league import (
     LeaseRequest,
     LeaseStatus,
 )
+from shared.messages.texts import clipped
 from shared.messages.training import Receipt, VersionReceipt, VersionReport
 
 log = structlog.get_logger()
@@ -87,9 +89,9 @@ class Desk:
             return Receipt(accepted=True)
         if problem := checks.results_problem(self._state, results, self._rules):
             self.counters["refused_results"] += 1
-            self.last_error = f"results of {results.actor} refused: {problem}"
+            self.last_error = clipped(f"results of {results.actor} refused: {problem}")
             log.warning("results_refused", actor=results.actor, name=results.name, reason=problem)
-            return Receipt(accepted=False, reason=problem)
+            return Receipt(accepted=False, reason=clipped(problem))
         self._journal.record(checks.played(results))
         self.counters["results"] += 1
         self.counters["bouts"] += len(results.bouts)
@@ -212,16 +214,16 @@ class Desk:
         self.moved_at = self._clock.now()
 
     def _receipt(self, report: VersionReport, reason: str = "") -> VersionReceipt:
+        elsewhere = Names()
+        for version, snapshot in self._journal.since(report.agent, report.policy_version):
+            if snapshot != report.snapshot:
+                for name in self._journal.rollouts_behind(report.agent, version):
+                    elsewhere.add(name)
         return VersionReceipt(
             accepted=not reason,
             latest_version=self._state.latest_version(report.agent),
             stage=schedule.stage_now(self._state),
-            learned_elsewhere=tuple(
-                name
-                for version, snapshot in self._journal.since(report.agent, report.policy_version)
-                if snapshot != report.snapshot
-                for name in self._journal.rollouts_behind(report.agent, version)
-            ),
+            learned_elsewhere=tuple(elsewhere.spans()),
             reason=reason,
         )
 

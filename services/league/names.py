@@ -44,6 +44,11 @@ class Names:
         ranges = self._boots.get(found[1])
         return ranges is not None and int(found[2]) in ranges
 
+    def spans(self) -> Iterator[str]:
+        """Yield ``boot:first-last`` for each range; names of another form are left out."""
+        for boot, ranges in self._boots.items():
+            yield from (f"{boot}:{first}-{last}" for first, last in ranges)
+
     def add(self, name: str) -> bool:
         """Enter a name; return whether it was not there before."""
         if name in self:

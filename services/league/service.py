@@ -33,6 +33,7 @@ from shared.messages.league import (
     SnapshotRequest,
 )
 from shared.messages.message import Message
+from shared.messages.texts import clipped
 from shared.messages.topics import (
     INCIDENT,
     LEASE,
@@ -203,7 +204,7 @@ class League:
             is_final = isinstance(error, SnapshotError)
             what = f"version {report.policy_version} of {report.agent}: {error}"
             self._desk.counters["refused_versions"] += 1
-            self._desk.last_error = what
+            self._desk.last_error = clipped(what)
             log.warning("version_refused", agent=report.agent, reason=what, is_final=is_final)
             request.refuse(what, retry=not is_final)
             return None
@@ -219,7 +220,7 @@ class League:
             try:
                 payload = self._store.get(request.message.snapshot)
             except SnapshotError as error:
-                self._desk.last_error = str(error)
+                self._desk.last_error = clipped(str(error))
                 log.warning("snapshot_missed", reason=str(error))
                 nothing = np.zeros(0, np.uint8)
                 request.reply(SnapshotReply(found=False, payload=nothing, reason=str(error)))

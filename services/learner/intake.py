@@ -3,6 +3,7 @@
 A held rollout is answered only when the learner says that what was made from it is durable.
 """
 
+import re
 from collections import Counter, deque
 from collections.abc import Sequence
 
@@ -20,10 +21,10 @@ from services.learner.gate import (
 from services.learner.played import Played
 from shared.bus.base import Inbox, Request
 from shared.bus.delivery import Applied
-from shared.bus.ranges import LARGEST
 from shared.clock import Clock
 from shared.game.rules import RuleBook
 from shared.messages.league import Leases, LeaseSummary, Schedule, Stage
+from shared.messages.texts import clipped
 from shared.messages.training import Agent, Receipt, Rollout
 
 log = structlog.get_logger()
@@ -34,6 +35,7 @@ HELD_BATCHES = 4
 """Rollouts held at once, in batches; more are told to ask again."""
 MAX_UNKNOWN_LEASES = 1024
 MAX_FAULTS = 64
+_SPAN = re.compile(r"(.*):([0-9]{1,18})-([0-9]{1,18})", re.DOTALL | re.ASCII)
 
 Held = tuple[Request[Rollout, Receipt], Rollout]
 
@@ -160,18 +162,25 @@ class Intake:
             request.reply(Receipt(accepted=True))
         self._committing = []
 
-    def learned_elsewhere(self, names: Sequence[str]) -> None:
-        """Never learn from these: the ledger has versions made from them that are lost here."""
-        for name in names:
-            boot, _, sequence = name.rpartition(":")
-            if sequence.isdecimal() and int(sequence) <= LARGEST:
-                self.applied.add(boot, int(sequence))
-        known = set(names)
+    def learned_elsewhere(self, spans: Sequence[str]) -> None:
+        """Never learn from these: the ledger has versions made from them that are lost here.
+
+        Args:
+            spans: ``boot:first-last`` of the numbers in their names.
+        """
+        for span in spans:
+            if (found := _SPAN.fullmatch(span)) is None or int(found[2]) > int(found[3]):
+                log.warning("span_ignored", span=clipped(span))
+                continue
+            self.applied.cover(found[1], int(found[2]), int(found[3]))
+        kept: list[Held] = []
         for request, rollout in self._gathered:
-            if rollout.name in known:
+            if self.applied.contains(rollout.boot, rollout.sequence):
                 self.counters["rollouts_repeated"] += 1
                 request.reply(Receipt(accepted=True))
-        self._gathered = [held for held in self._gathered if held[1].name not in known]
+            else:
+                kept.append((request, rollout))
+        self._gathered = kept
 
     def release(self, reason: str) -> None:
         """Answer the gathered rollouts: they will not be learned from."""
@@ -208,10 +217,11 @@ class Intake:
             self._played.setdefault(rollout.lease, Played()).add(rollout)
             self._gathered.append((request, rollout))
         elif ruling.decision is Decision.LATER and not self._is_too_late(rollout.lease):
-            request.refuse(ruling.reason, retry=True)
+            request.refuse(clipped(ruling.reason), retry=True)
         else:
             if ruling.is_fault or ruling.decision is Decision.LATER:
-                self.faults.append(f"rollout {rollout.name} of {rollout.actor}: {ruling.reason}")
+                fault = f"rollout {rollout.name} of {rollout.actor}: {ruling.reason}"
+                self.faults.append(clipped(fault))
             self._drop(request, ruling.reason)
 
     def _rule(self, rollout: Rollout, version: int) -> Ruling:
@@ -243,4 +253,4 @@ class Intake:
     def _drop(self, request: Request[Rollout, Receipt], reason: str) -> None:
         self.counters["rollouts_dropped"] += 1
         log.info("rollout_dropped", name=request.message.name, reason=reason)
-        request.reply(Receipt(accepted=False, reason=reason))
+        request.reply(Receipt(accepted=False, reason=clipped(reason)))

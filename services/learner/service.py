@@ -203,7 +203,8 @@ class Learner:
             f"{self._agent} version {report.policy_version} is taken by another policy "
             f"({receipt.reason}); continued as version {version}",
         )
-        self._meta = msgspec.structs.replace(self._meta, policy_version=version)
+        applied = self._intake.applied.to_json()  # with what was learned elsewhere
+        self._meta = msgspec.structs.replace(self._meta, policy_version=version, applied=applied)
         self._store.save(self._meta, self._optimiser.state())
         self._snapshot = self._make_snapshot()
         self._report()

@@ -170,6 +170,16 @@ class Applied:
         while len(self._boots) > self._max_boots:
             del self._boots[next(iter(self._boots))]
 
+    def cover(self, boot: str, first: int, last: int) -> None:
+        """Enter all messages of a boot from one number to another.
+
+        Raises:
+            ValueError: there are no such numbers.
+            OverflowError: ``last`` is no number that fits.
+        """
+        self.add(boot, first)
+        self._boots[boot].cover(first, last)
+
     def to_json(self) -> str:
         """Return everything as one line of JSON."""
         return msgspec.json.encode(

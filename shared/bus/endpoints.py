@@ -206,14 +206,17 @@ class Held(Generic[In, Out]):
         return self._message
 
     def reply(self, message: Out) -> None:
-        """Answer; only the first answer counts.
+        """Answer; only the first answer counts. One over the service's limit becomes a refusal.
 
         Raises:
-            ValueError: the answer is longer than the service allows, or not encodable.
+            ValueError: the answer is not encodable.
         """
         payload = encode(message)
         if len(payload) > self._service.max_reply_bytes:
-            raise ValueError(too_long(len(payload), self._key, self._service.max_reply_bytes))
+            reason = too_long(len(payload), self._key, self._service.max_reply_bytes)
+            log.error("reply_too_long", reason=reason)
+            self.refuse(f"the answer cannot be sent: {reason}")
+            return
         back, self._back = self._back, None
         if back is not None:
             self._host.counts.sent(len(payload))

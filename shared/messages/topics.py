@@ -128,7 +128,7 @@ RESULTS = Service(
     "finished bouts; acknowledged when they are in the ledger", acked=True,
 )
 VERSION = Service(
-    "league/version", VersionReport, VersionReceipt, 8 * MIB, 4 * KIB, ("learner",), "league",
+    "league/version", VersionReport, VersionReceipt, 8 * MIB, 1 * MIB, ("learner",), "league",
     "a new policy version; acknowledged when ledger and snapshot store hold it", acked=True,
 )
 INCIDENT = Service(

@@ -135,6 +135,7 @@ class VersionReceipt(Message, frozen=True, kw_only=True):
     stage: int
     """The stage now; another than the report's when that one has ended. -1 when all are done."""
     learned_elsewhere: tuple[str, ...] = ()
-    """Names of the rollouts behind other versions of this agent, from the reported one on: what a
-    learner that lost its newest checkpoint must not learn from again."""
+    """The rollouts behind other versions of this agent, from the reported one on: what a learner
+    that lost its newest checkpoint must not learn from again. ``boot:first-last`` of their names'
+    numbers."""
     reason: str = ""

@@ -309,13 +309,17 @@ def test_another_answer_than_the_services_is_refused(world: Any) -> None:
     assert "Lease refused: has schema 'LeaseRequest/" in answer.reason
 
 
-def test_an_answer_over_the_limit_is_the_answerers_bug(world: Any) -> None:
+def test_an_answer_over_the_limit_is_refused_and_ends_nobody(world: Any) -> None:
     asker, answerer = world.join("actor-0"), world.join("league")
     inbox = connected(world, asker, answerer)
-    asker.ask(LEASE, REQUEST, 1.0)
+    pending = asker.ask(LEASE, REQUEST, 5.0)
     request = world.until(inbox.take)
-    with pytest.raises(ValueError, match="over its limit of 16384 B"):
-        request.reply(Lease(lease="x" * 10_000, kind="none", reason="y" * 10_000))
+    request.reply(Lease(lease="x" * 10_000, kind="none", reason="y" * 10_000))
+    answer = world.until(pending.take)
+    assert isinstance(answer, Refused)
+    assert answer.reason.startswith("the answer cannot be sent: ")
+    assert "over its limit of 16384 B" in answer.reason
+    assert not answer.retry
 
 
 def test_an_array_arrives_as_it_was_sent(world: Any) -> None:

@@ -28,6 +28,13 @@ def test_every_name_is_kept_once_whatever_its_form(entered: list[str]):
     assert again == names
 
 
+def test_names_are_told_as_spans_of_their_numbers():
+    names = Names()
+    for name in ("a:3", "a:1", "odd", "a:2", "b:c:7"):
+        names.add(name)
+    assert list(names.spans()) == ["a:1-3", "b:c:7-7"]
+
+
 def test_names_that_follow_each_other_take_no_room():
     names = Names()
     for number in range(10_000):

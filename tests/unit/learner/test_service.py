@@ -334,6 +334,36 @@ def test_a_version_that_the_ledger_holds_with_other_weights_gets_the_next_number
     assert CheckpointStore(table.folder, "run-1", "antagonist", 3).versions()[0] == 8
 
 
+def test_what_was_learned_elsewhere_is_never_learned_again_not_even_after_a_kill(table: Table):
+    table.warm()
+    lost = rollout(50, policy_version=1)
+    table.send()
+    request = table.report()
+    elsewhere = (f"{lost.boot}:40-60", f"{lost.boot}:nonsense", f"{lost.boot}:9-1")
+    request.reply(
+        VersionReceipt(
+            accepted=False, latest_version=7, stage=0, reason="it is another",
+            learned_elsewhere=elsewhere,
+        )
+    )  # fmt: skip
+    table.learner.tick()  # the checkpoint of version 8 is on the disk
+    table.restart()
+    table.accept()
+    table.schedule()
+    again = table.send(msgspec.structs.replace(lost, policy_version=8))
+    assert again.take() == Receipt(accepted=True)
+    assert table.counters["rollouts_accepted"] == 0
+
+
+def test_whatever_a_rollout_quotes_the_learner_answers_and_lives(patient: Table):
+    patient.warm()
+    answer = patient.send(rollout(100, policy_version=1, actor="x" * 16_000)).take()
+    assert isinstance(answer, Receipt)
+    assert answer.reason.startswith("wrong actor: xxx")
+    assert answer.reason.endswith("characters)")
+    assert len(patient.learner.health().last_error) < 600
+
+
 def test_a_version_that_the_league_will_never_take_ends_the_learner(table: Table):
     request = table.report()
     request.refuse("it is no snapshot")

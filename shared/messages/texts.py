@@ -1,0 +1,13 @@
+"""Texts that go into messages: short enough for every limit, whatever they quote."""
+
+from typing import Final
+
+LONGEST: Final = 500
+"""Characters of a reason or an error that is told to others; the log has all of it."""
+
+
+def clipped(text: str, longest: int = LONGEST) -> str:
+    """Return a text, or its beginning and how long it is."""
+    if len(text) <= longest:
+        return text
+    return f"{text[:longest]}... ({len(text)} characters)"
