@@ -7,6 +7,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from services.jobs.plain import plain, printable
 from shared.messages.live import Progress, ServiceStatus
 
 SILENT_SECONDS = 3.0
@@ -90,11 +91,11 @@ def render(snapshot: Snapshot) -> RenderableType:
     """Return everything that a person is shown."""
     parts: list[RenderableType] = []
     if snapshot.progress is not None:
-        parts.append(Text(headline(snapshot.progress)))
+        parts.append(plain(headline(snapshot.progress)))
     parts.append(table(snapshot))
     codes = sorted({code(status) for status in snapshot.services})
     if len(codes) > 1:
-        parts.append(Text(f"different code is running: {', '.join(codes)}", style="yellow"))
+        parts.append(plain(f"different code is running: {', '.join(codes)}", "yellow"))
     return Group(*parts)
 
 
@@ -116,34 +117,38 @@ def table(snapshot: Snapshot) -> Table:
     for host in sorted(hosts, key=lambda name: (-len(hosts[name]), name)):
         rows = hosts[host]
         codes = sorted({code(heard.status) for heard in rows})
-        made.add_row(Text(host, style="bold cyan"), Text(", ".join(codes), style="dim"))
+        made.add_row(plain(host, "bold cyan"), plain(", ".join(codes), "dim"))
         for heard in sorted(rows, key=lambda one: (one.status.role, one.status.name)):
             made.add_row(*_cells(heard))
     if snapshot.missing:
         made.add_row(Text("not heard", style="bold red"))
     for missing in snapshot.missing:
-        made.add_row(f"  {missing.name}", Text(missing.why, style="red"))
+        made.add_row(plain(f"  {missing.name}"), plain(missing.why, "red"))
     return made
 
 
 def _cells(heard: Heard) -> Sequence[RenderableType]:
     status = heard.status
-    state = Text(status.state)
+    state = plain(status.state)
     if heard.silent_seconds >= SILENT_SECONDS:
-        state = Text(f"silent for {heard.silent_seconds:.0f} s, then: {status.state}", style="red")
-    shown = [rate_text(name, value) for name, value in sorted(status.rates.items())[:RATES]]
+        state = plain(f"silent for {heard.silent_seconds:.0f} s, then: {status.state}", "red")
+    policies = sorted(status.policies.items())
+    rates = sorted(status.rates.items())[:RATES]
     return (
-        f"  {status.name}",
+        plain(f"  {status.name}"),
         state,
-        waits(status),
-        "\n".join(policy_text(agent, version, heard.lags.get(agent, 0))
-                  for agent, version in sorted(status.policies.items())),
-        "\n".join(shown),
-        "\n".join(f"{name} {count:,}" for name, count in drops(status).items()),
+        plain(waits(status)),
+        _lines(policy_text(agent, number, heard.lags.get(agent, 0)) for agent, number in policies),
+        _lines(rate_text(name, value) for name, value in rates),
+        _lines(f"{name} {count:,}" for name, count in drops(status).items()),
         "" if heard.cpu_percent is None else f"{heard.cpu_percent:.0f} %",
         f"{status.rss_bytes / 2**20:.0f} MiB",
-        status.last_error,
-    )  # fmt: skip
+        plain(status.last_error),
+    )
+
+
+def _lines(texts: Iterable[str]) -> Text:
+    return Text("\n".join(map(printable, texts)))
 
 
 def code(status: ServiceStatus) -> str:

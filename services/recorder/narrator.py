@@ -16,6 +16,8 @@ PROGRESS_CURVES = ("approx_kl", "explained_variance", "policy_lag_mean")
 """Fields of the league's progress that are learning curves."""
 CURVE_PERIOD = 2.0
 """Seconds from one point of a learning curve to the next, at least."""
+MOST_PROCESSES = 12_000
+"""That are kept; the one heard longest ago goes first."""
 
 
 @dataclasses.dataclass
@@ -106,13 +108,16 @@ class Narrator:
     def on_status(self, status: ServiceStatus) -> None:
         """A process says how it is."""
         now = self._clock.now()
-        known = self._processes.get(status.name)
+        known = self._processes.pop(status.name, None)  # the newest stands last
         if known is None or known.status.boot != status.boot:
             what = "started" if known is None else "came back as a new process"
             level: Level = "INFO" if known is None else "WARN"
             self.say("services", f"{status.name} {what} (pid {status.pid})", level)
             self._processes[status.name] = _Process(status, now)
+            while len(self._processes) > MOST_PROCESSES:
+                del self._processes[next(iter(self._processes))]
             return
+        self._processes[status.name] = known
         if status.last_error and status.last_error != known.status.last_error:
             self.say("services", f"{status.name}: {status.last_error}", "ERROR")
         waits = status.waiting_seconds > LONG_WAIT

@@ -9,6 +9,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from services.jobs.plain import plain, printable
 from services.jobs.play.match import Match
 from services.jobs.play.plan import Plan
 from services.jobs.play.summary import loop_of, loop_text
@@ -84,13 +85,14 @@ class Screen:
             self._live.update(self._panel(), refresh=True)
         else:
             self._due_at = now + LINE_PERIOD
-            text = ", ".join((*self.notes, line(self._match)))
+            text = printable(", ".join((*self.notes, line(self._match))))
             if text != self._shown:
                 self._print(text)
             self._shown = text
 
     def say(self, text: str) -> None:
         """Show an event."""
+        text = printable(text)
         self._events.append((self._clock.now(), text))
         if self._live is None:
             self._print(text)
@@ -102,14 +104,13 @@ class Screen:
     def _panel(self) -> RenderableType:
         match = self._match
         parts: list[RenderableType] = [bout_row(match)]
-        parts += [Text(note) for note in self.notes]
+        parts += [plain(note) for note in self.notes]
         if match.gate is not None:
             mode = match.gate.mode
-            parts.append(
-                Text.assemble("robot ", (mode, COLOURS[mode]), f"  {match.gate.reason}".rstrip())
-            )
+            reason = printable(f"  {match.gate.reason}".rstrip())
+            parts.append(Text.assemble("robot ", (mode, COLOURS[mode]), reason))
         if match.waits_for:
-            parts.append(Text(f"waits for {match.waits_for}", "yellow"))
+            parts.append(plain(f"waits for {match.waits_for}", "yellow"))
         if self.status is not None:
             parts.append(Text(loop_text(loop_of(self.status)), "dim"))
         for at, text in self._events:
@@ -132,7 +133,7 @@ def bout_row(match: Match) -> Table:
     """Return bout, phase, time and score in a row."""
     words = bout_words(match)
     grid = Table.grid(*("" for _ in words), padding=(0, 3, 0, 0))
-    grid.add_row(*words)
+    grid.add_row(*map(plain, words))
     return grid
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import msgspec
 
+from services.jobs.plain import printable
 from services.jobs.play.match import BoutResult
 from services.jobs.play.plan import SUMMARY, Plan
 from shared.messages.live import ServiceStatus
@@ -98,7 +99,7 @@ def summary_text(folder: Path, match: PlayedMatch) -> str:
         lines.append(f"{'bout':<18}{'score':>9}{'hits':>8}{'touches':>9}{'camping':>9}{'time':>9}")
     lines += map(_bout_line, match.bouts)
     if match.ended:
-        lines.append(f"ended early: {match.ended}")
+        lines.append(f"ended early: {printable(match.ended)}")
     if match.loop:
         lines.append(loop_text(match.loop))
     lines += [f"died: {name}" for name in match.deaths]
@@ -129,9 +130,9 @@ def loop_text(loop: dict[str, float]) -> str:
 
 
 def _bout_line(bout: BoutResult) -> str:
-    why = f"  void: {bout.reason}" if bout.outcome == "void" else ""
+    why = f"  void: {printable(bout.reason)}" if bout.outcome == "void" else ""
     return (
-        f"{bout.bout:<18}{bout.score:>+9g}{bout.attack_steps:>8}{bout.penalty_steps:>9}"
+        f"{printable(bout.bout):<18}{bout.score:>+9g}{bout.attack_steps:>8}{bout.penalty_steps:>9}"
         f"{bout.camping_steps:>9}{bout.seconds:>7.1f} s{why}"
     )
 

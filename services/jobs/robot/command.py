@@ -11,6 +11,7 @@ from typing import Literal, get_args
 
 import msgspec
 
+from services.jobs.plain import printable
 from services.jobs.status import OPEN_SECONDS, add_bus_arguments, read_endpoint
 from services.jobs.who import operator
 from shared.bus.base import Bus, NoAnswer, Refused
@@ -55,7 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if found.json:
         print(json.dumps(msgspec.to_builtins(reply)))
     else:
-        print("\n".join(lines(found.action, reply)))
+        print("\n".join(map(printable, lines(found.action, reply))))
     return 0 if reply.accepted else EXIT_REFUSED
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import msgspec
 from rich.console import Console
 
+from services.jobs.plain import printable
 from services.jobs.play.command import FREE_BYTES, Course
 from services.jobs.play.plan import LAPTOP, Plan, override
 from services.jobs.play.plan import parse as parse_play
@@ -82,7 +83,8 @@ def main(argv: Sequence[str]) -> int:
             bound={"service": "study-run", "run_id": plan.run},
         )  # fmt: skip
         if progress.state != "new":
-            console.print(f"{name} goes on where it was {spoken(progress)}", highlight=False)
+            text = f"{name} goes on where it was {spoken(progress)}"
+            console.print(text, highlight=False, markup=False)
         host = StudyHost(plan, study.protocol.title, name, browser=not found.no_browser)
         with stop_on_signals(deadline=STOP_SECONDS) as stop:
             code = Course(
@@ -174,7 +176,7 @@ def ending_text(plan: Plan, study: Study, progress: Progress, participant: str) 
         for attempt in progress.games.get(step.id, ()):
             score = attempt.end.score if attempt.end is not None else None
             points = f"{score:+g}" if score is not None else "-"
-            why = f"  {attempt.reason}" if attempt.reason else ""
+            why = f"  {printable(attempt.reason)}" if attempt.reason else ""
             lines.append(f"  {attempt.start.bout:<16}{attempt.outcome:<10}{points:>8}{why}")
     lines.append(f"data       {plan.folder}")
     if progress.state in ("new", "going", "aborted"):

@@ -11,6 +11,7 @@ from types import TracebackType
 from rich.console import Console
 from rich.live import Live
 
+from services.jobs.plain import printable
 from services.jobs.report.words import clock_text
 from services.jobs.train.dashboard_view import State, line, render
 from shared.bus.base import Bus
@@ -88,7 +89,7 @@ class Dashboard:
         self.state.now = self._clock.now()
         self.state.say(text)
         if self._live is None:
-            self._print(text)
+            self._print(printable(text))
 
     def _listen(self) -> None:
         while (status := self._status.take()) is not None:

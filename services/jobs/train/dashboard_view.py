@@ -11,6 +11,7 @@ from rich.rule import Rule
 from rich.table import Table
 from rich.text import Text
 
+from services.jobs.plain import plain, printable
 from services.jobs.report.words import clock_text
 from shared.messages.live import Progress, ServiceStatus
 
@@ -18,6 +19,8 @@ GONE_SECONDS = 4.0
 """A process that has said nothing for this long is called silent."""
 EVENTS = 5
 HISTORY = 4096
+MOST_SERVICES = 12_000
+"""That are kept; the one heard longest ago goes first."""
 MIB = 1 << 20
 COLOURS = {"antagonist": "dark_orange3", "protagonist": "dodger_blue2"}
 BLOCKS = "▁▂▃▄▅▆▇█"
@@ -69,7 +72,7 @@ class State:
 
     def on_status(self, status: ServiceStatus) -> None:
         """Take in how a process is."""
-        known = self.services.get(status.name)
+        known = self.services.pop(status.name, None)  # the newest stands last
         row = Row(status, self.now)
         if known is not None and known.status.boot == status.boot:
             used = status.cpu_seconds - known.status.cpu_seconds
@@ -78,10 +81,12 @@ class State:
         elif known is not None:
             self.say(f"{status.name} came back as process {status.pid}")
         self.services[status.name] = row
+        while len(self.services) > MOST_SERVICES:
+            del self.services[next(iter(self.services))]
 
     def say(self, text: str) -> None:
         """Add an event."""
-        self.events.append((self.now, text))
+        self.events.append((self.now, printable(text)))
 
     def stage_eta(self) -> float | None:
         """Return the seconds that this stage's budget takes at its present pace."""
@@ -117,7 +122,7 @@ def line(state: State) -> str:
     ]
     if progress.eta_seconds >= 0:
         parts.append(f"ETA {clock_text(progress.eta_seconds)}")
-    return ", ".join(parts)
+    return printable(", ".join(parts))
 
 
 def _round_parts(progress: Progress) -> list[str]:
@@ -178,7 +183,7 @@ def _progress(state: State) -> RenderableType:
     progress = state.progress
     if progress is None:
         heard = ", ".join(sorted(state.services)) or "nobody yet"
-        return Text(f"starting; heard from {heard}", style="dim")
+        return plain(f"starting; heard from {heard}", "dim")
     done = _done_share(progress)
     grid = Table.grid(padding=(0, 2, 0, 0), expand=True)
     grid.add_column(no_wrap=True)
@@ -186,9 +191,9 @@ def _progress(state: State) -> RenderableType:
     grid.add_column(justify="right", no_wrap=True)
     if progress.agent:
         style = COLOURS.get(progress.agent, "")
-        who = Text.assemble((progress.agent, f"bold {style}"), " learns")
+        who = Text.assemble((printable(progress.agent), f"bold {style}"), " learns")
         if progress.round:
-            who.append(f" v {progress.opponent}", style="dim")
+            who.append_text(plain(f" v {progress.opponent}", "dim"))
         share = progress.update / max(1, progress.max_updates)
         count = f"update {progress.update} of {progress.max_updates}"
         grid.add_row(who, _bar(share, style), _with_eta(count, state.stage_eta()))
@@ -197,7 +202,7 @@ def _progress(state: State) -> RenderableType:
         count = f"bout {progress.evaluations_done:,} of {progress.evaluations_total:,}"
         grid.add_row(Text("evaluation", "bold"), _bar(share, "green"), count)
     else:
-        grid.add_row(Text(progress.message or "waiting for the learners", "dim"), "", "")
+        grid.add_row(plain(progress.message or "waiting for the learners", "dim"), "", "")
     where = f"phase {progress.phase}, iteration {max(1, progress.iteration)}"
     if progress.round:
         where = (
@@ -255,19 +260,19 @@ def _services(state: State) -> RenderableType:
         row = state.services[name]
         status = row.status
         silent = state.now - row.heard_at
-        does = Text(status.state)
+        does = plain(status.state)
         if silent > GONE_SECONDS:
             does = Text(f"silent for {clock_text(silent)}", "bold red")
         elif status.last_error:
-            does = Text(status.last_error, "yellow")
+            does = plain(status.last_error, "yellow")
         waits = ""
         if status.waiting_for:
             waits = f"{status.waiting_for} {status.waiting_seconds:.0f} s"
         restarts = state.restarts.get(name, 0)
         table.add_row(
-            name,
+            plain(name),
             does,
-            waits,
+            plain(waits),
             f"{row.cpu_percent:.0f}",
             f"{status.rss_bytes / MIB:.0f}",
             Text(str(restarts), "yellow" if restarts else "dim"),

@@ -2,8 +2,10 @@ import io
 from pathlib import Path
 from typing import Any
 
+import pytest
 from rich.console import Console
 
+from services.jobs.train import dashboard_view
 from services.jobs.train.dashboard import Dashboard
 from services.jobs.train.dashboard_view import State, line, render, sparkline
 from shared.bus.memory import MemoryHub
@@ -165,3 +167,39 @@ def test_on_a_terminal_it_is_drawn_twice_a_second(tmp_path: Path) -> None:
             clock.advance(0.1)
 
     assert 8 <= out.getvalue().count("Ctrl-C stops in order") <= 10
+
+
+def test_what_is_heard_is_shown_as_it_is_and_never_obeyed() -> None:
+    nasty = "[/x] [bus] \x1b]0;owned\x07"
+    state = running()
+    state.on_status(
+        status(f"a {nasty}", state=nasty, waiting_for=f"w {nasty}", waiting_seconds=2.0)
+    )
+    state.on_status(status("b", last_error=f"e {nasty}"))
+    state.on_progress(progress(message=f"m {nasty}", agent=nasty, round=1, opponent=f"o {nasty}"))
+
+    text = shown(state, 200)
+
+    for first in ("a", "w", "e", "m", "o"):
+        assert f"{first} [/x] [bus] ]0;owned" in text
+    assert "[/x] [bus] ]0;owned learns" in text
+    assert "\x1b" not in text
+    assert "\x1b" not in line(state)
+
+
+def test_before_it_starts_names_are_shown_as_they_are() -> None:
+    state = State(run="r", started_at=0.0)
+    state.on_status(status("a [/x] [bus] \x1b]0;"))
+    text = shown(state)
+    assert "heard from a [/x] [bus] ]0;" in text
+    assert "\x1b" not in text
+
+
+def test_invented_services_push_out_who_was_heard_longest_ago(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(dashboard_view, "MOST_SERVICES", 3)
+    state = State(run="r", started_at=0.0)
+    for name in ("a", "b", "c", "a", "d", "e"):
+        state.on_status(status(name))
+    assert list(state.services) == ["a", "d", "e"]

@@ -5,6 +5,7 @@ import json
 import os
 from pathlib import Path
 
+import msgspec
 import pytest
 from rich.console import Console
 
@@ -117,6 +118,29 @@ def test_a_terminal_shows_phase_score_gate_and_lateness(plan: Plan):
         "policy-protagonist died", "http://127.0.0.1:8765", "Ctrl-C ends",
     ):  # fmt: skip
         assert words in shown, words
+
+
+@pytest.mark.parametrize("is_terminal", [True, False])
+def test_what_is_heard_is_shown_as_it_is_and_never_obeyed(plan: Plan, is_terminal: bool):
+    nasty = "[/x] [bus] \x1b]0;owned"
+    stage = Stage().in_bout()
+    stage.reason = f"gate {nasty}"
+    stage.say("running", 42.0)
+    stage.tick(0.3)
+    assert stage.state is not None
+    stage.match.referee = msgspec.structs.replace(stage.state, bout=f"bout {nasty}")
+    stage.match.waits_for = f"w {nasty}"
+    out = io.StringIO()
+    console = Console(file=out, width=200, force_terminal=is_terminal, color_system=None)
+    with Screen(plan, stage.match, stage.play, stage.clock, console) as screen:
+        screen.notes = (f"note {nasty}",)
+        screen.say(f"said {nasty}")
+        screen.tick()
+    text = out.getvalue()
+    for first in ("bout", "w", "note", "said"):
+        assert f"{first} [/x] [bus] ]0;owned" in text, first
+    assert ("gate [/x]" in text) == is_terminal
+    assert "\x1b]" not in text
 
 
 def test_what_a_match_waits_for_is_in_its_line():

@@ -7,7 +7,7 @@ from rich.console import Console
 
 from services.jobs import status
 from services.jobs.roll_call import RollCall
-from services.jobs.status_view import Heard, Snapshot, headline, lags, render
+from services.jobs.status_view import Heard, Missing, Snapshot, headline, lags, render
 from shared.bus.memory import MemoryHub
 from shared.clock import ManualClock, SystemClock
 from shared.errors import ConfigError
@@ -129,6 +129,31 @@ def test_the_load_of_a_process_is_what_it_used_between_two_reports():
         clock.advance(2.5)
     (heard,) = call.snapshot().processes
     assert heard.cpu_percent == pytest.approx(100.0 * 1.5 / 3.0, rel=0.2)
+
+
+def test_what_is_heard_is_shown_as_it_is_and_never_obeyed():
+    nasty = "[/x] [bus] \x1b]0;owned\x07"
+    said = msgspec.structs.replace(
+        ACTOR, name=f"n {nasty}", host=f"h {nasty}", state=f"s {nasty}",
+        waiting_for=f"w {nasty}", last_error=f"e {nasty}", version=f"v {nasty}",
+        rates={f"r {nasty}": 1.0}, counters={f"drop {nasty}": 2}, policies={f"p {nasty}": 3},
+    )  # fmt: skip
+    snapshot = Snapshot(
+        processes=(
+            Heard(status=said, silent_seconds=0.0), Heard(status=LEARNER, silent_seconds=0.0),
+            Heard(status=said, silent_seconds=9.0),
+        ),
+        missing=(Missing(name=f"m {nasty}", role="actor", why=f"why {nasty}"),),
+        progress=msgspec.structs.replace(PROGRESS_NOW, run=f"run {nasty}"),
+    )  # fmt: skip
+    console = Console(width=400, force_terminal=True, color_system=None)
+    with console.capture() as capture:
+        console.print(render(snapshot))
+    text = capture.get()
+    for first in ("n", "h", "s", "w", "e", "v", "r", "drop", "p", "m", "why", "run"):
+        assert f" {first} [/x] [bus] ]0;owned" in f" {text}".replace("\n", " "), first
+    assert "then: s [/x]" in text
+    assert "\x1b" not in text
 
 
 def test_the_headline_says_who_learns_and_how_long_it_takes():
