@@ -265,7 +265,10 @@ class Archivist:
         self._work.append(self._file(bout.folder, info, lost))
 
     def _file(self, folder: Path, info: BoutInfo, lost: dict[str, int]) -> Iterator[None]:
-        """Turn the journals of a folder into finished files; stops after each of them."""
+        """Turn the journals of a folder into finished files; stops after each of them.
+
+        The journals go last: killed before, it is all done once more, with the same result.
+        """
         counts: dict[str, StreamInfo] = {}
         found: dict[str, Rows] = {}
         for name, stream in BY_NAME.items():
@@ -281,10 +284,10 @@ class Archivist:
         for name, rows in found.items():
             made = parquet_of(BY_NAME[name], rows, info)
             atomic_write(folder / f"{name}{FINISHED}", made)
-            (folder / f"{name}{JOURNAL}").unlink()
             self.counters["archive_bytes"] += len(made)
             yield
         atomic_write(folder / INFO_FILE, _json(info))
+        _remove_journals(folder)
         self.counters["bouts_archived"] += 1
         log.info(
             "bout_archived",
@@ -305,6 +308,8 @@ class Archivist:
             info = read_info(folder)
             if info.outcome == "running":
                 self._work.append(self._mend(folder, info))
+            else:
+                _remove_journals(folder)
 
     def _mend(self, folder: Path, info: BoutInfo) -> Iterator[None]:
         """Finish a bout whose recorder was killed."""
@@ -333,6 +338,12 @@ class Archivist:
         self.counters["bouts_unarchived"] += 1
         self.last_error = str(error)
         log.warning("archive_failed", reason=str(error))
+
+
+def _remove_journals(folder: Path) -> None:
+    """Delete what finished files were made from."""
+    for path in folder.glob(f"*{JOURNAL}"):
+        path.unlink(missing_ok=True)
 
 
 def _count(rows: Rows, dropped: int, *, has_tick: bool) -> StreamInfo:

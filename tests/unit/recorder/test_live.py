@@ -1,5 +1,6 @@
 """Live bouts as they are recorded: every stream, at its rate, and what becomes of trouble."""
 
+import contextlib
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
+from services.recorder import archivist
 from services.recorder.config import RecorderConfig
 from services.recorder.tap import Tap
 from services.robot_io.trackers import ReplayTracker
@@ -18,6 +20,7 @@ from shared.errors import ConfigError, RiposteError
 from shared.game.rules import RuleBook
 from shared.messages import topics
 from shared.messages.play import GateState
+from shared.runtime.files import atomic_write
 from shared.telemetry.archive import archived_bouts, load_bout, missing_ticks, read_journal
 from shared.telemetry.live import LATENESS, PHASE_PATH, SERIES
 from shared.telemetry.streams import BY_NAME, GATE, MESSAGES, STREAMS, Column
@@ -387,3 +390,36 @@ def test_every_column_is_described_and_every_message_is_a_stream() -> None:
             assert isinstance(column, Column)
             assert column.about
             assert column.unit or column.kind == "text"
+
+
+class Killed(BaseException):
+    """The recorder ends here."""
+
+
+@pytest.mark.parametrize("place", range(0, 8, 2))
+def test_a_recorder_killed_while_it_finishes_a_bout_loses_nothing_of_it(
+    tmp_path: Path, place: int, monkeypatch: pytest.MonkeyPatch
+):
+    fencing = Fencing(tmp_path, ONLY_ARCHIVE, rules=RULES)
+    fencing.start("one", EN_GARDE)
+    writes = 0
+
+    def killed_at_the(path: Path, data: bytes) -> None:
+        nonlocal writes
+        writes += path.suffix == ".parquet"
+        if writes > place:
+            raise Killed
+        atomic_write(path, data)
+
+    with monkeypatch.context() as patch, contextlib.suppress(Killed):
+        patch.setattr(archivist, "atomic_write", killed_at_the)
+        fencing.rest(EN_GARDE, RULES.bout_steps + 300)
+        fencing.recorder.close()
+    (folder,) = archived_bouts(tmp_path)
+    mending = Fencing(tmp_path, ONLY_ARCHIVE, rules=RULES)
+    mending.rest(EN_GARDE, 50)
+    mending.recorder.close()
+    bout = load_bout(folder)
+    assert (bout.info.outcome, bout.info.steps) == ("finished", RULES.bout_steps)
+    assert len(bout.streams["bats"]) > RULES.bout_steps
+    assert not list(folder.glob("*.arrows"))
