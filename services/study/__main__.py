@@ -47,8 +47,9 @@ def build(args: ServeArgs, bus: Bus, clock: Clock) -> Study:
         write_participants(study)
 
     terms = Terms(
-        countdown=cfg.countdown, score_seconds=cfg.score_seconds, needs_recorder=cfg.needs_recorder
-    )
+        countdown=cfg.countdown, score_seconds=cfg.score_seconds,
+        needs_recorder=cfg.needs_recorder, has_heart_rate=cfg.has_heart_rate,
+    )  # fmt: skip
     journal = Journal(folder, clock)
     window: Web | None = None
     try:

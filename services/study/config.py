@@ -28,6 +28,8 @@ class StudyConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """How long the score is shown after a game (s)."""
     needs_recorder: bool = True
     """Whether games that count wait for a recorder."""
+    has_heart_rate: bool = True
+    """Whether a heart-rate sensor is worn; without one, baselines end unmeasured."""
     lsl: bool = False
     """Offer events and heart rate as Lab Streaming Layer streams, to everybody on the network."""
 

@@ -80,6 +80,8 @@ class Terms(msgspec.Struct, frozen=True, kw_only=True):
     """How long the score is shown after it (s)."""
     needs_recorder: bool = True
     """Whether games that count wait for a recorder."""
+    has_heart_rate: bool = True
+    """Whether a baseline in which no heart rate was heard is measured again."""
 
 
 class Wait(msgspec.Struct, frozen=True, tag=True):

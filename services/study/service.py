@@ -209,8 +209,10 @@ class Study:
         """Return what the researcher should know at once."""
         session = self.session
         warnings = [
-            f"{step}: no heart rate was measured, the baseline is missing"
-            for step, measured in session.progress.baselines.items() if not measured.beats
+            f"{step.id}: no heart rate was measured, the baseline is missing"
+            for step in self._plan.steps
+            if step.kind == "baseline" and step.id in session.progress.done
+            and not ((found := session.progress.baselines.get(step.id)) and found.beats)
         ]  # fmt: skip
         if session.moment.trouble:
             warnings.append(session.moment.trouble)

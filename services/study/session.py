@@ -52,6 +52,7 @@ MOST_ACTIONS = 8
 LONGEST_BOUT = 600.0
 """What the referee judges in one piece (s); an exploration may take several."""
 KILLED = "the runner of the study was killed during it"
+UNMEASURED = "no heart rate was measured: begin again, or skip it with a reason"
 
 log = structlog.get_logger()
 
@@ -239,6 +240,8 @@ class Session:
                 self._start(step, now)
             case End():
                 self._end(step, action, now)
+            case Finish() if self._is_unmeasured(step):
+                self.start_over(UNMEASURED)
             case Finish():
                 self.finish(step)
             case Wait():
@@ -318,6 +321,10 @@ class Session:
             self.moment = replace(self.moment, stage="ready", bout="")
         else:
             self.finish(step)
+
+    def _is_unmeasured(self, step: Step) -> bool:
+        """Return whether a baseline that is over heard nothing of a sensor that should be there."""
+        return step.kind == "baseline" and not self.window.beats and self.terms.has_heart_rate
 
     def _measure(self, step: Step) -> None:
         window = self.window

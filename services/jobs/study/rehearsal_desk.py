@@ -10,7 +10,7 @@ import numpy as np
 from services.study.answering import Answering, sections_to_rank
 from services.study.asks import Asks
 from services.study.course import PLAYED
-from services.study.session import Session
+from services.study.session import UNMEASURED, Session
 from services.study.view import (
     Answer,
     ParticipantAction,
@@ -84,6 +84,8 @@ class Desk:
     def _researcher_action(self, step: Step) -> ResearcherAction | None:
         session = self._session
         stage = session.moment.stage
+        if stage == "idle" and step.kind == "baseline" and session.moment.trouble == UNMEASURED:
+            return "next"  # a simulated heart that is silent stays so
         if stage == "idle" and "begin" in self._answering.may_researcher():
             return "begin"
         is_game = step.kind in PLAYED and step.kind != "explore"

@@ -22,6 +22,7 @@ from services.jobs.play.plan import plan_of as play_plan_of
 from services.jobs.play.seats import PERSON
 from services.jobs.study.hosting import StudyHost
 from services.jobs.study.players import seats_of
+from services.robot_io.heart_rate.source import HeartRateConfig
 from services.study.config import StudyConfig
 from services.study.course import STATIC
 from shared.bus.ports import free_port
@@ -156,6 +157,8 @@ def plan_of(study: Study, found: argparse.Namespace) -> Plan:
     if plan.antagonist.reference != PERSON:
         settings["study.antagonist"] = plan.antagonist.reference
     settings["study.needs_recorder"] = plan.play.record
+    heart = load_section(site, "heart_rate", HeartRateConfig, words)
+    settings["study.has_heart_rate"] = heart.source != "none"
     plan = play_plan_of(parse_play([*argv, *_set(_words(settings))]))
     run = f"{study.protocol.name}-{found.participant}-{folder.name}"
     return msgspec.structs.replace(plan, run=run_id_of(Path(run)))

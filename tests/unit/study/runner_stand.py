@@ -131,9 +131,11 @@ class Stand:
     """A study and everybody it talks to."""
 
     def __init__(
-        self, folder: Path, *, has_tables: bool = False, outlet: Outlet | None = None
-    ) -> None:
+        self, folder: Path, *, has_tables: bool = False, outlet: Outlet | None = None,
+        has_heart_rate: bool = True,
+    ) -> None:  # fmt: skip
         """Start everybody; tables are many files, each synced to the disk."""
+        self._terms = Terms(countdown=0.5, score_seconds=0.5, has_heart_rate=has_heart_rate)
         self._has_tables = has_tables
         self._outlet = outlet
         self.clock = ManualClock(AT)
@@ -197,8 +199,8 @@ class Stand:
 
         plan = plan_of(self.study_folder, cfg, b"settings")
         self.study = Study(
-            plan, self.session_folder, Terms(countdown=0.5, score_seconds=0.5), self.journal,
-            self.asks, self.pages, write_tables, self.study_bus, self.clock, self._outlet,
+            plan, self.session_folder, self._terms, self.journal, self.asks, self.pages,
+            write_tables, self.study_bus, self.clock, self._outlet,
         )  # fmt: skip
         self.session = self.study.session
 

@@ -45,8 +45,16 @@ def test_a_session_has_its_own_folder_its_players_and_nobody_is_named_to_it(tmp_
         "scripted:guard": "scripted:guard", "scripted:heuristic": "scripted:heuristic",
     }  # fmt: skip
     assert (cfg.antagonist, cfg.needs_recorder) == ("person", True)
+    assert not cfg.has_heart_rate  # heart_rate.source is "none" on a laptop
     assert plan.protagonist.reference == "scripted:static"
     assert not plan.folder.exists()
+
+
+def test_a_session_with_a_strap_waits_for_its_heart_rate(tmp_path: Path):
+    plan = planned(study_in(tmp_path / "study"), "--set", "heart_rate.source=ble")
+    path = tmp_path / "config.toml"
+    path.write_text(plan.settings)
+    assert load_section(path, "study", StudyConfig).has_heart_rate
 
 
 @pytest.mark.parametrize(("antagonist", "has_page"), [("mouse", True), ("scripted:stab", False)])

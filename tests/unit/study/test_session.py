@@ -6,12 +6,15 @@ from pathlib import Path
 
 import pytest
 
+from services.jobs.study.rehearsal_desk import Desk
+from services.study.answering import Answering
 from services.study.view import Answer
 from shared.errors import RiposteError, StudyError
 from shared.messages.play import PlayRequest
 from shared.messages.topics import BOUT
 from shared.study.events import Answer as Given
 from shared.study.events import Answered
+from shared.study.people.population import Population, draw
 from shared.study.progress import replay
 from shared.study.rows import GameRow, HeartRateRow, RankingRow
 from shared.study.tsv import read_table
@@ -110,7 +113,7 @@ def test_a_game_waits_for_the_robot_to_be_armed_by_a_person(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_a_baseline_is_the_mean_of_its_window_and_a_missing_one_is_said(tmp_path: Path):
+def test_a_baseline_is_the_mean_of_its_window(tmp_path: Path):
     stand = Stand(tmp_path / "study")
     stand.walk("baseline-walking")
     stand.rate = 100.0
@@ -123,12 +126,61 @@ def test_a_baseline_is_the_mean_of_its_window_and_a_missing_one_is_said(tmp_path
     assert measured.beats_per_minute == pytest.approx(110.0)
     assert measured.seconds == pytest.approx(3.0, abs=0.1)
 
+
+def test_a_baseline_in_which_nothing_was_measured_is_begun_again_or_skipped(tmp_path: Path):
+    stand = Stand(tmp_path / "study")
+    stand.walk("baseline-walking")
+    stand.rate = None
+    stand.ask("begin")
+    stand.tick(4.0)
+    assert stand.session.moment.stage == "idle"
+    assert "begin again, or skip it with a reason" in stand.session.waits_for
+    assert stand.whats("measured") == []
+    assert stand.kinds("baseline-walking") == ["step_began"]
+    stand.rate = 90.0
+    stand.ask("begin")
+    stand.tick(4.0)
+    (measured,) = stand.whats("measured")
+    assert measured.beats_per_minute == pytest.approx(90.0)
+    assert stand.session.step.id == "instruction"
+    assert not stand.pages.researcher.warnings
+
     other = Stand(tmp_path / "other")
+    other.walk("baseline-walking")
     other.rate = None
-    other.walk("instruction")
-    (measured,) = other.whats("measured")
-    assert (measured.beats, measured.beats_per_minute) == (0, None)
+    other.ask("begin")
+    other.tick(4.0)
+    assert other.ask("next", reason="the strap is broken").is_done
+    assert other.whats("measured") == []
+    (done,) = [event for event in other.events if event.step == "baseline-walking"][-1:]
+    assert (done.kind, done.what.reason) == ("step_done", "the strap is broken")
+    other.tick(0.3)
     assert "the baseline is missing" in other.pages.researcher.warnings[0]
+
+
+def test_without_a_sensor_a_baseline_ends_with_its_time(tmp_path: Path):
+    stand = Stand(tmp_path / "study", has_heart_rate=False)
+    stand.rate = None
+    stand.walk("instruction")
+    (measured,) = stand.whats("measured")
+    assert (measured.beats, measured.beats_per_minute) == (0, None)
+    stand.tick(0.3)
+    assert "the baseline is missing" in stand.pages.researcher.warnings[0]
+
+
+def test_the_people_of_a_rehearsal_skip_a_baseline_that_cannot_be_measured(tmp_path: Path):
+    stand = Stand(tmp_path / "study")
+    stand.walk("baseline-walking")
+    stand.rate = None
+    traits = draw(Population(), 1, 1)
+    desk = Desk(stand.session, Answering(stand.session), stand.asks, traits, 1, stand.clock)
+
+    def looks() -> bool:
+        desk.tick()
+        return stand.session.step.id == "instruction"
+
+    stand.until(looks, 10.0)
+    assert stand.whats("measured") == []
 
 
 @pytest.mark.slow
