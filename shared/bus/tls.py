@@ -63,6 +63,7 @@ def tls_json(files: TlsFiles) -> dict[str, Any]:
         "connect_private_key": str(files.key),
         "enable_mtls": True,
         "verify_name_on_connect": True,
+        "close_link_on_expiration": True,  # of either certificate: nobody outstays theirs
     }
 
 

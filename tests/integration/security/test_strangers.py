@@ -77,6 +77,21 @@ def test_a_certificate_that_has_expired_is_refused(site: Locked, tmp_path: Path)
     raise AssertionError(site.events("connection_refused"))
 
 
+def test_a_certificate_that_expires_takes_its_open_session_with_it(
+    site: Locked, tmp_path: Path
+) -> None:
+    soon = datetime.datetime.now(datetime.UTC) - datetime.timedelta(days=10, seconds=-4)
+    files = site.issue("actor", tmp_path, soon, 10)
+    careless = site.client("actor", **files, close_link_on_expiration=False)
+    with session(careless) as guest, session(site.client("actor")) as witness:
+        assert list(guest.info.routers_zid())
+        deadline = time.monotonic() + 15
+        while list(guest.info.routers_zid()) and time.monotonic() < deadline:
+            time.sleep(0.1)
+        assert not list(guest.info.routers_zid())
+        assert list(witness.info.routers_zid())
+
+
 def test_a_router_under_a_name_its_certificate_lacks_is_not_trusted(site: Locked) -> None:
     endpoint = f"tls/127.0.0.9:{site.port}"  # nobody listens there; the router is on 127.0.0.1
     said = why_refused(endpoint, files_of(str(site.certificates), "actor"))

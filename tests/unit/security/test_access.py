@@ -42,6 +42,7 @@ def test_everyone_must_show_a_certificate_and_check_the_others_name() -> None:
         assert link["protocols"] == ["tls"]
         assert link["tls"]["enable_mtls"] is True
         assert link["tls"]["verify_name_on_connect"] is True
+        assert link["tls"]["close_link_on_expiration"] is True
     assert link["tls"]["connect_private_key"] == "/certs/actor.key"
 
 
