@@ -42,14 +42,15 @@ def clock_problem(now_ns: int, last_ns: int) -> str | None:
     back = (last_ns - now_ns) / 1e9
     if back > MAX_BACK:
         return (
-            f"the clock of this machine shows {text_of(now_ns)}, {_spoken(back)} before the last "
+            f"the clock of this machine shows {text_of(now_ns)}, {spoken(back)} before the last "
             f"event ({text_of(min(last_ns, _LATEST_NS))}): set it right (timedatectl); where it is "
             "right now and was wrong then, this session cannot be gone on with"
         )
     return None
 
 
-def _spoken(seconds: float) -> str:
+def spoken(seconds: float) -> str:
+    """Return a length of time as people say it: ``3.0 h``."""
     if seconds < 120.0:
         return f"{seconds:.1f} s"
     return f"{math.floor(seconds / 60.0)} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"

@@ -19,6 +19,8 @@ from shared.study.instants import clock_problem
 FILE: Final = "journal.jsonl"
 MAX_BYTES: Final = 64 << 20
 """Of a journal: some 200,000 events."""
+LAST_BYTES: Final = 2 << 20
+"""Of a journal, in which its last line is looked for: answers have at most half of that."""
 
 _ENCODER = msgspec.json.Encoder()
 _DECODER = msgspec.json.Decoder(Event)
@@ -128,6 +130,20 @@ def read_journal(folder: Path) -> tuple[Event, ...]:
     except OSError as error:
         raise StudyError(f"cannot read {path}: {error.strerror or error}") from error
     return tuple(decode_events(data, str(path))[0])
+
+
+def last_event(folder: Path) -> Event | None:
+    """Return the last event of a session's folder, without reading the others.
+
+    None where there is no journal, or its last line is none.
+    """
+    try:
+        with (folder / FILE).open("rb") as file:
+            file.seek(max(file.seek(0, os.SEEK_END) - LAST_BYTES, 0))
+            lines = file.read(LAST_BYTES).split(b"\n")[:-1]  # the rest was cut short
+        return _DECODER.decode(lines[-1]) if lines else None
+    except (OSError, msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return None
 
 
 def decode_events(data: bytes, name: str) -> tuple[list[Event], int]:

@@ -32,6 +32,7 @@ from shared.errors import ConfigError, StudyError
 from shared.runtime.files import RunLock, atomic_write, require_free_space
 from shared.runtime.logging import configure_logging
 from shared.runtime.serve import run_id_of, stop_on_signals
+from shared.study.dates import FLAG, date_problem, latest_known
 from shared.study.folder import Study, hash_of, open_study
 from shared.study.instants import clock_problem
 from shared.study.journal import read_journal
@@ -57,6 +58,10 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
         "scripted:NAME",
     )  # fmt: skip
     parser.add_argument("--port", type=int, metavar="N", help="of the pages (8770, or a free one)")
+    parser.add_argument(
+        FLAG, action="store_true", dest="is_clock_right",
+        help="go on though the dates in the study's folder say that the clock is wrong",
+    )  # fmt: skip
     parser.add_argument("--no-browser", action="store_true", help="only print the addresses")
     parser.add_argument(
         "--set", action="append", default=[], dest="overrides", metavar="SECTION.KEY=VALUE",
@@ -70,7 +75,7 @@ def main(argv: Sequence[str]) -> int:
     found = parse(argv)
     clock = SystemClock()
     study = open_study(found.folder)
-    progress = progress_of(study, found.participant, clock)
+    progress = progress_of(study, found.participant, clock, is_clock_right=found.is_clock_right)
     plan = plan_of(study, found)
     console = Console()
     name = found.participant
@@ -99,8 +104,16 @@ def main(argv: Sequence[str]) -> int:
     return EXIT_ABORTED if progress.state == "aborted" else code
 
 
-def progress_of(study: Study, participant: str, clock: Clock) -> Progress:
+def progress_of(
+    study: Study, participant: str, clock: Clock, *, is_clock_right: bool = False
+) -> Progress:
     """Return where a participant's session stands before it is run.
+
+    Args:
+        study: whose session it is.
+        participant: who is to play.
+        clock: the rows will be dated by it.
+        is_clock_right: a person says so, whatever dates the study's folder has.
 
     Raises:
         StudyError: nobody of that name is expected, they have played already, or the clock of
@@ -117,7 +130,11 @@ def progress_of(study: Study, participant: str, clock: Clock) -> Progress:
             "participant of the allocation"
         )
     last = events[-1].wall_ns if events else 0
-    if (problem := clock_problem(clock.wall_ns(), last)) is not None:
+    now = clock.wall_ns()
+    problem = clock_problem(now, last)
+    if problem is None and not is_clock_right:
+        problem = date_problem(now, latest_known(study))
+    if problem is not None:
         raise StudyError(problem)
     return progress
 
