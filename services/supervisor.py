@@ -176,6 +176,8 @@ class Supervisor:
                 code = child.popen.poll()
                 if code is not None:
                     events += self._note_end(child, code)
+                else:
+                    _bound(child)
             elif child.restart_at is not None and self._clock.now() >= child.restart_at:
                 child.restarts += 1
                 events.append(self._start(child))
@@ -246,6 +248,14 @@ class Supervisor:
     ) -> ProcessEvent:
         tail = "" if code is None else _tail(child.output, child.output_from)
         return ProcessEvent(kind, child.spec.name, pid, child.restarts, code, tail, delay)
+
+
+def _bound(child: _Child) -> None:
+    """Empty the output of a process that has said too much; the process appends to it."""
+    with contextlib.suppress(OSError):
+        if child.output.stat().st_size > OUTPUT_BYTES:
+            os.truncate(child.output, 0)
+            child.output_from = 0
 
 
 def _wait_for_end(popen: subprocess.Popen[bytes]) -> int:

@@ -43,6 +43,8 @@ class Journal:
         self.failure = ""
         """Why the ledger cannot be written now; empty while it can."""
         self.failures = 0
+        self._is_stale = False
+        """The state has events that are not in the ledger."""
         self._clock = clock
         self._retry_at = 0.0
         self._ledger = Ledger(path)
@@ -86,6 +88,7 @@ class Journal:
             if len(entries) != len(self.uncommitted) or entries[-1].seq != self.state.position:
                 raise LedgerError(f"ledger {self._ledger.path} was changed by somebody else")
         except LedgerError as error:
+            self._is_stale = True
             self._fail(error)
             return False
         return True
@@ -97,7 +100,8 @@ class Journal:
         if self._clock.now() < self._retry_at:
             return False
         try:
-            self.state = self._replay(self._remembers)
+            if self._is_stale:  # once: nobody else writes, and a long ledger takes seconds
+                self.state, self._is_stale = self._replay(self._remembers), False
             self._ledger.check_writable()
         except LedgerError as error:
             self._fail(error)

@@ -60,11 +60,15 @@ class Fifo(Generic[T]):
 
 
 class Newest(Generic[T]):
-    """The newest value of each key, once: what is not newer than the last one seen is dropped."""
+    """The newest value of each key, once: what is not newer than the last one seen is dropped.
+
+    Of more than ``MAX_KEYS`` keys the one that was silent longest is forgotten.
+    """
 
     def __init__(self) -> None:
         self._values: OrderedDict[str, T] = OrderedDict()
-        self._seen: dict[str, dict[str, int]] = {}
+        self._seen: OrderedDict[str, dict[str, int]] = OrderedDict()
+        """By key, the one that was silent longest first: the newest count of each writer."""
         self._lock = threading.Lock()
 
     def offer(self, key: str, boot: str, count: int, value: T) -> bool:
@@ -80,8 +84,10 @@ class Newest(Generic[T]):
             seen = self._seen.get(key)
             if seen is None:
                 if len(self._seen) >= MAX_KEYS:
-                    return False
+                    silent, _ = self._seen.popitem(last=False)
+                    self._values.pop(silent, None)
                 seen = self._seen[key] = {}
+            self._seen.move_to_end(key)
             if count <= seen.get(boot, -1):
                 return False
             if boot not in seen and len(seen) >= MAX_WRITERS:

@@ -1,3 +1,4 @@
+import itertools
 import os
 import signal
 import subprocess
@@ -192,6 +193,22 @@ def test_no_process_survives_the_kill_of_its_supervisor(tmp_path: Path):
         parent.kill()
         parent.wait(10)
     until(lambda: not any(is_running(pid) for pid in children))
+
+
+def test_a_process_that_never_stops_talking_does_not_fill_the_disk(supervise, tmp_path: Path):
+    chatter = "import time\nwhile True: print('x' * 9999, flush=True); time.sleep(0.001)"
+    supervisor = supervise(spec("chatter", chatter))
+    supervisor.start()
+    output = tmp_path / "chatter.out"
+    sizes = [0]
+
+    def was_emptied_twice() -> bool:
+        supervisor.poll()
+        sizes.append(output.stat().st_size)
+        return sum(b < a for a, b in itertools.pairwise(sizes)) >= 2
+
+    until(was_emptied_twice)
+    assert max(sizes) < 2 * module.OUTPUT_BYTES
 
 
 def test_a_program_that_is_not_there_is_given_up_and_named(supervise):

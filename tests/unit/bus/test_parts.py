@@ -38,11 +38,24 @@ def test_newest_keeps_one_value_a_key_and_never_goes_back() -> None:
     assert newest.pop() is None
 
 
-def test_newest_is_bounded_in_keys() -> None:
+def test_newest_is_bounded_in_keys_and_forgets_who_was_silent_longest() -> None:
     newest = Newest[int]()
     for number in range(MAX_KEYS):
         assert newest.offer(str(number), "b", 0, number)
-    assert not newest.offer("one more", "b", 0, 0)
+    assert not newest.offer("0", "b", 0, 0)  # said again: alive
+    assert newest.offer("one more", "b", 0, -1)
+    assert not newest.offer("0", "b", 0, 0)
+    waiting = [newest.pop() for _ in range(MAX_KEYS)]
+    assert newest.pop() is None
+    assert waiting == [0, *range(2, MAX_KEYS), -1]  # "1" is forgotten
+    assert newest.offer("1", "b", 1, 1)
+
+
+def test_names_that_change_for_ever_make_nobody_deaf() -> None:
+    newest = Newest[int]()
+    for number in range(3 * MAX_KEYS):
+        assert newest.offer(f"actor-{number}", "b", 0, number)
+        assert newest.pop() == number
 
 
 def test_a_latest_value_is_due_again_after_its_period() -> None:

@@ -292,6 +292,27 @@ def test_a_league_on_a_full_disk_refuses_with_the_reason_and_recovers(tmp_path: 
     match.stop()
 
 
+def test_while_the_disk_is_full_the_ledger_is_read_once_and_not_at_each_try(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    match = Match(tmp_path)
+    match.both_start()
+    lease = match.lease()
+    read: list[int] = []
+    replay = Ledger.replay
+    monkeypatch.setattr(Ledger, "replay", lambda self: read.append(1) or replay(self))
+    room = max(path.stat().st_size for path in tmp_path.rglob("*") if path.is_file())
+    with no_room(room):
+        assert isinstance(match.play(lease, sequence=1, bouts=3000), Refused)
+        for _ in range(10):
+            match.clock.advance(1.0)
+            match.note(1)
+    match.clock.advance(1.0)
+    assert match.renew(lease).alive
+    assert read == [1]
+    match.stop()
+
+
 @pytest.mark.skipif(os.getuid() != 0, reason="mounting a small disk needs root")
 def test_a_league_on_a_small_disk_loses_nothing_it_acknowledged(tmp_path: Path) -> None:
     disk = tmp_path / "disk"
