@@ -32,13 +32,19 @@ def mean_estimate(values: Floats, name: str) -> Estimate:
     return Estimate(name=name, value=mean, low=mean - half, high=mean + half, method="t")
 
 
-def effect_dz(t: float, n: int, name: str = "d_z") -> Estimate:
-    """Return the standardised mean of n differences, t / sqrt(n), by the noncentral t."""
-    root = math.sqrt(n)
-    low = _noncentrality(lambda nc: float(stats.nct.cdf(t, n - 1, nc)) - (1.0 - TAIL), t)
-    high = _noncentrality(lambda nc: float(stats.nct.cdf(t, n - 1, nc)) - TAIL, t)
+def effect_dz(t: float, n: float, df: float | None = None) -> Estimate:
+    """Return the standardised mean of n differences, t / sqrt(n), by the noncentral t.
+
+    Args:
+        t: the statistic.
+        n: differences that the mean is worth.
+        df: of t; None is n - 1.
+    """
+    root, free = math.sqrt(n), n - 1 if df is None else df
+    low = _noncentrality(lambda nc: float(stats.nct.cdf(t, free, nc)) - (1.0 - TAIL), t)
+    high = _noncentrality(lambda nc: float(stats.nct.cdf(t, free, nc)) - TAIL, t)
     return Estimate(
-        name=name,
+        name="d_z",
         value=t / root,
         low=None if low is None else low / root,
         high=None if high is None else high / root,

@@ -3,7 +3,6 @@
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shared.study.analysis.chapter import (
     Cell,
@@ -16,13 +15,11 @@ from shared.study.analysis.chapter import (
     verdict,
 )
 from shared.study.analysis.finding import Finding
-from shared.study.analysis.games import Games, mean_of
-from shared.study.analysis.paired import Named, one_sample
+from shared.study.analysis.games import Games
 from shared.study.analysis.power import Planned
 from shared.study.analysis.regression import compare_slopes, mean_slope
+from shared.study.analysis.switch import switch_effect
 from shared.study.people.population import Population, Traits
-
-Floats = NDArray[np.float64]
 
 NOT_PEOPLE: Final = (
     "Nobody took part: simulated people are not people. How they move, learn and answer was put "
@@ -52,34 +49,6 @@ def slope_question(games: Games, names: tuple[str, str]) -> Finding:
     """
     one, two = (games.by_condition[:, games.conditions.index(name)] for name in names)
     return compare_slopes(games.numbers, one, two, f"slope: {names[0]} - {names[1]}")
-
-
-def switch_question(games: Games) -> Finding:
-    """Return whether a switch of the opponent sets people back.
-
-    The score of the first game of a section less that of the last one before it, less the mean
-    step from game to game within sections; each score less the mean of all people's games against
-    that opponent, so that the opponents' own difficulty is no part of it. Sections that everybody
-    meets in the same place say nothing about a switch, and are left out.
-    """
-    cube = games.by_section.copy()
-    people, sections, _ = cube.shape
-    level = {
-        name: float(np.nanmean(games.by_condition[:, index]))
-        for index, name in enumerate(games.conditions)
-    }
-    for k, person in enumerate(games.people):
-        for section, name in enumerate(games.orders[person][:sections]):
-            cube[k, section] -= level[name]
-    free = slice(len(games.first), sections)
-    part = cube[:, free]
-    steps = np.full(people, np.nan)
-    if part.shape[1] > 1:
-        jumps = part[:, 1:, 0] - part[:, :-1, -1]
-        rises = (part[:, :, -1] - part[:, :, 0]) / max(part.shape[2] - 1, 1)
-        steps = mean_of(jumps) - mean_of(rises)
-    named = Named("change of score at a switch of the opponent, its difficulty taken out", "points")
-    return one_sample(steps, named)
 
 
 def rehearsal_chapter(
@@ -117,7 +86,7 @@ def rehearsal_chapter(
             f"Most games against {' and '.join(at_ceiling)} reach {percent_text(CEILING)} of what "
             "an untouched bat would score: there little is left to be learned, whoever learns."
         )
-    switch = switch_question(games)
+    switch = switch_effect(games)
     findings.append(switch)
     if switch.estimate is not None:
         says.append(

@@ -18,7 +18,9 @@ from shared.study.analysis.paired import Named, holm, paired
 from shared.study.analysis.regression import compare_slopes, mean_slope, pooled
 from shared.study.analysis.repeated import repeated_anova
 from shared.study.analysis.shuffles import shuffled_variance
+from shared.study.analysis.switch import switch_effect
 from shared.study.analysis.variances import compare_variances
+from tests.unit.study_analysis.made import switched
 
 NAMED = Named("does it differ?")
 GAMES = np.arange(1.0, 11.0)
@@ -122,7 +124,19 @@ def _family(generator):
     return {"any of seven, Holm": min(finding.p_adjusted for finding in family)}
 
 
-NULL_STUDIES = (_pairs, _levels, _lines, _compared, _correlations, _rest, _family)
+def _switches(generator):
+    def orders(first, free, count):
+        return [first + "".join(generator.permutation(list(free))) for _ in range(count)]
+
+    easy_first = switched(generator, (600.0, 300.0, 350.0, 250.0), 1, orders("a", "bcd", 16), 5)
+    uneven = switched(generator, (300.0, 700.0), 0, ["ab"] * 7 + ["ba"] * 3, 10, pace=20.0)
+    return {
+        "switch of the opponent, the first easier": switch_effect(easy_first).p,
+        "switch of the opponent, uneven orders": switch_effect(uneven).p,
+    }
+
+
+NULL_STUDIES = (_pairs, _levels, _lines, _compared, _correlations, _rest, _family, _switches)
 """p of each test in a study in which nothing happens; "at most" where a test is discrete, or known
 to be cautious with few people: then at most the nominal rate is what it promises."""
 
@@ -224,6 +238,12 @@ def _within(generator):
     return _holds(within_people(x, y + own, "q").effect, 0.6)
 
 
+def _switch(generator):
+    orders = ["a" + "".join(generator.permutation(list("bcd"))) for _ in range(16)]
+    games = switched(generator, (600.0, 300.0, 350.0, 250.0), 1, orders, 5, drop=80.0)
+    return _holds(switch_effect(games).estimate, -80.0)
+
+
 def _alpha(generator):
     truth = 5 * 0.5 / (1 + 4 * 0.5)
     items = generator.normal(size=(16, 1)) + generator.normal(size=(16, 5))
@@ -243,6 +263,7 @@ COVERED = {
     "slope, all games": _pooled_slope,
     "slope, clustered": _clustered_slope,
     "difference of slopes": _slope_difference,
+    "switch of the opponent": _switch,
     "partial eta squared": _eta,
     "Pearson's r": _correlation,
     "Spearman's rho": lambda generator: _correlation(generator, beside=True),

@@ -3,9 +3,11 @@
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
+from shared.study.analysis.games import Games
 from shared.study.folder import PARTICIPANTS, Study
 from shared.study.instants import text_of
 from shared.study.recorded import GAMES, HEART_RATE, QUESTIONNAIRE, RANKINGS
@@ -138,6 +140,41 @@ def _write(study, participant, labels, order, person):
 
 def _beat(who, when, at, rate):
     return HeartRateRow(**who, **when, **at, bpm=rate, contact=True, source="strap")
+
+
+def switched(
+    generator: np.random.Generator, levels: Sequence[float], first: int, orders: Sequence[str],
+    games: int, *, pace: float = 10.0, drop: float = 0.0,
+) -> Games:  # fmt: skip
+    """Return games of people who learn on through all sections, ``drop`` points lost at a switch.
+
+    Args:
+        generator: of scores and paces.
+        levels: how easy conditions a, b, ... are (points).
+        first: how many of them everybody meets first.
+        orders: of each person: ``acb``.
+        games: of a section.
+        pace: mean of what people learn in a game (points).
+        drop: points lost for good at each switch but those of the first sections.
+    """
+    names = tuple("abcdef"[: len(levels)])
+    shape = (len(orders), len(levels), games)
+    by_section = generator.normal(0.0, 100.0, shape)
+    by_section += generator.normal(pace, pace / 2.0, (len(orders), 1, 1)) * np.arange(
+        len(levels) * games
+    ).reshape(len(levels), games)
+    by_section -= drop * np.maximum(np.arange(len(levels)) - first, 0)[:, None]
+    by_condition = np.empty(shape)
+    for k, order in enumerate(orders):
+        for section, name in enumerate(order):
+            by_section[k, section] += levels[names.index(name)]
+            by_condition[k, names.index(name)] = by_section[k, section]
+    return Games(
+        people=tuple(f"sub-{k + 1:02d}" for k in range(len(orders))), conditions=names,
+        first=names[:first], by_section=by_section, by_condition=by_condition,
+        orders={f"sub-{k + 1:02d}": tuple(order) for k, order in enumerate(orders)},
+        bouts=MappingProxyType({}), left_out=(),
+    )  # fmt: skip
 
 
 def line_scores(

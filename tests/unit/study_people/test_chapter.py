@@ -3,14 +3,15 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
+from shared.study.analysis.chapters.learning import learning_chapter
 from shared.study.analysis.games import Games
 from shared.study.analysis.power import plan
+from shared.study.analysis.switch import switch_effect
 from shared.study.people.attitudes import SIMULATED_TEXT, choices, points, ranks, words
 from shared.study.people.chapter import (
     NOT_PEOPLE,
     rehearsal_chapter,
     slope_question,
-    switch_question,
 )
 from shared.study.people.population import Population, draw
 from shared.study.protocol import Item
@@ -50,11 +51,22 @@ def test_who_learns_faster_against_the_first_is_found_with_its_interval():
 
 
 def test_a_drop_at_the_switch_is_found_whatever_the_opponents_difficulty():
-    dropped = switch_question(played((0.0, 0.0), 200.0))
+    dropped = switch_effect(played((0.0, 0.0), 200.0))
     assert dropped.estimate is not None
     assert dropped.estimate.value == pytest.approx(-200.0, abs=15.0)
-    still = switch_question(played((0.0, 0.0), 0.0))
+    still = switch_effect(played((0.0, 0.0), 0.0))
     assert not still.is_significant
+
+
+def test_a_rehearsals_report_gives_one_answer_about_the_switch():
+    games = played((5.0, 5.0), 100.0)
+    people = tuple(draw(Population(), number, 1) for number in range(1, 13))
+    rehearsal = rehearsal_chapter(games, Population(), people, None, "a", 1000.0)
+    learning = learning_chapter(games, np.random.default_rng(0))
+    assert learning is not None
+    answers = [finding for chapter in (rehearsal, learning) for finding in chapter.findings
+               if "switch" in finding.question]  # fmt: skip
+    assert answers == [switch_effect(games)] * 2
 
 
 def test_the_chapter_says_first_that_nobody_took_part_and_names_a_ceiling():

@@ -22,9 +22,10 @@ from shared.study.analysis.chapter import (
 from shared.study.analysis.finding import Finding
 from shared.study.analysis.games import Games
 from shared.study.analysis.mixed import mixed_slopes
-from shared.study.analysis.paired import Named, holm, paired
+from shared.study.analysis.paired import holm
 from shared.study.analysis.regression import compare_slopes, mean_slope, person_slopes, pooled
 from shared.study.analysis.repeated import repeated_anova
+from shared.study.analysis.switch import switch_effect
 from shared.telemetry.study_figures import LinePanel, learning_panels
 
 Floats = NDArray[np.float64]
@@ -52,7 +53,7 @@ def learning_chapter(games: Games, generator: np.random.Generator) -> Chapter | 
     mixed: list[Finding] = []
     if len(names) == 2:
         mixed.append(mixed_slopes(x, cubes[0], cubes[1], f"slope: {names[0]} - {names[1]}"))
-    switch = _switch(games)
+    switch = switch_effect(games)
     says = [
         *_line_words(lines, names),
         *_compared_words(compared, mixed),
@@ -71,7 +72,7 @@ def learning_chapter(games: Games, generator: np.random.Generator) -> Chapter | 
         title="Learning",
         says=tuple(says),
         headlines=3,
-        findings=(*lines, *means, *compared, *mixed, *holm(rises), *switch),
+        findings=(*lines, *means, *compared, *mixed, *holm(rises), switch),
         tables=(_lines_table(lines, names), _slopes_table(games)),
         pictures=tuple(pictures),
     )
@@ -81,43 +82,19 @@ def _played(cube: Floats) -> Floats:
     return cube[:, np.isfinite(cube).any(axis=0)]
 
 
-def _switch(games: Games) -> list[Finding]:
-    """Return whether scores change more at a new section than from game to game in one."""
-    cube = games.by_section
-    people, sections, _ = cube.shape
-    if sections < 2:
-        return []
-    steps, within = np.full(people, np.nan), np.full(people, np.nan)
-    for k in range(people):
-        jumps: list[float] = []
-        rises: list[float] = []
-        for section in range(sections):
-            there = cube[k, section][np.isfinite(cube[k, section])]
-            if len(there) > 1:
-                rises.append(float(there[-1] - there[0]) / (len(there) - 1))
-            if section:
-                before = cube[k, section - 1][np.isfinite(cube[k, section - 1])]
-                if len(there) and len(before):
-                    jumps.append(float(there[0] - before[-1]))
-        if jumps and rises:
-            steps[k], within[k] = float(np.mean(jumps)), float(np.mean(rises))
-    question = "change of score at a new section - from game to game in a section"
-    return [paired(steps, within, Named(question, "mean difference", "paired t-test"))]
-
-
-def _switch_words(found: list[Finding]) -> list[str]:
-    if not found or found[0].p is None or found[0].estimate is None:
+def _switch_words(found: Finding) -> list[str]:
+    if found.p is None or found.estimate is None:
         return []
     words = verdict(
-        found[0], "a new section, with another robot, interrupts people",
-        "no significant interruption by a new section, with another robot",
+        found, "a switch of the robot interrupts people",
+        "no significant interruption by a switch of the robot",
     )  # fmt: skip
-    if found[0].is_significant and found[0].estimate.value > 0.0:
-        words = "a new section, with another robot, does not set people back"
+    if found.is_significant and found.estimate.value > 0.0:
+        words = "a switch of the robot does not set people back"
     return [
-        f"From the last game of a section to the first of the next, the score changes by "
-        f"{estimate_words(found[0].estimate)} points more than from game to game within a "
-        f"section ({p_words(found[0])}): {words}."
+        f"Where the robot switches, the score changes by {estimate_words(found.estimate)} points "
+        f"more than from game to game, the robots' difficulty taken out ({p_words(found)}): "
+        f"{words}."
     ]
 
 
