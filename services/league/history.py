@@ -15,6 +15,8 @@ from services.league.records import CurvePoint, StageRecord, VersionRecord, pack
 from shared.messages.training import AGENTS, Agent
 
 SCRIPTED_STATIC = "scripted:static"
+ENDED_LEASES = 4096
+"""Held at least where not everything is remembered: late results name one."""
 
 
 @dataclasses.dataclass
@@ -103,7 +105,8 @@ class RunState:
     evaluation_done_at_ns: int | None = None
     incidents: list[IncidentRecord] = dataclasses.field(default_factory=list[IncidentRecord])
     leases: dict[str, LeaseRecord] = dataclasses.field(default_factory=dict[str, LeaseRecord])
-    """Every lease ever granted, oldest first."""
+    """Every lease ever granted, oldest first; none that ended long ago, if any are forgotten."""
+    leases_granted: int = 0
     live_leases: dict[str, None] = dataclasses.field(default_factory=dict[str, None])
     """Ids of those that have not ended, oldest first."""
     ended_leases: list[str] = dataclasses.field(default_factory=list[str])
@@ -314,6 +317,7 @@ class RunState:
 
     def _lease_granted(self, event: events.LeaseGranted, at_ns: int) -> None:
         self.leases[event.lease] = LeaseRecord(grant=event, granted_at_ns=at_ns)
+        self.leases_granted += 1
         self.live_leases[event.lease] = None
 
     def _lease_ended(self, event: events.LeaseEnded, at_ns: int) -> None:
@@ -322,6 +326,10 @@ class RunState:
         )
         del self.live_leases[event.lease]
         self.ended_leases.append(event.lease)
+        if self.remembers is not None and len(self.ended_leases) >= 2 * ENDED_LEASES:
+            for lease in self.ended_leases[:ENDED_LEASES]:
+                del self.leases[lease]
+            del self.ended_leases[:ENDED_LEASES]
 
     def _bouts(self, event: events.BoutsPlayed, at_ns: int) -> None:
         self.result_names.add(event.name)

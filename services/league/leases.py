@@ -44,7 +44,7 @@ def lease_window(cfg: LeagueConfig, actors: int, *, serial: bool) -> int:
 
 def grant(state: RunState, request: LeaseRequest) -> LeaseGranted | None:
     """Return the work for an actor, None when there is none now."""
-    number = len(state.leases) + 1
+    number = state.leases_granted + 1
     record = state.stage
     if record is not None and awaits_restart(record):
         return None

@@ -6,7 +6,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from services.league import journal
+from services.league import history, journal
 from services.league.history import RunState
 from services.league.ledger import open_read_only
 from services.league.progress import progress_of
@@ -60,6 +60,25 @@ def test_a_stage_holds_its_newest_versions_and_points_and_counts_them_all(match:
     ) == msgspec.structs.replace(
         progress_of(LONG, whole, 2000, ""), score_mean=0, score_low=0, score_high=0, score_bouts=0
     )
+
+
+def test_leases_that_ended_long_ago_are_forgotten_and_their_numbers_are_not_used_again(
+    match: Match, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(history, "ENDED_LEASES", 3)
+    names: list[str] = []
+    for _ in range(20):
+        names.append(match.lease().lease)
+        match.clock.advance(LONG.lease_seconds + 0.1)
+    assert len(set(names)) == 20
+    state = match.league.state
+    assert len(state.ended_leases) < 6
+    assert set(state.leases) == {*state.ended_leases, *state.live_leases}
+    assert names[-1] in state.leases
+    assert set(everything(match).leases) == set(names)
+    of_old = msgspec.structs.replace(match.lease(), lease=names[0])
+    late = match.ask(RESULTS, bout_results(of_old, "actor-0", "b0", 1))
+    assert not late.accepted
 
 
 def test_a_restarted_league_and_one_that_was_not_decide_the_same(match: Match):
