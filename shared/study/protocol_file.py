@@ -126,6 +126,7 @@ def _asked(
 def _instrument(keys: tuple[Key, ...], instrument: Instrument) -> Iterator[Problem]:
     items = instrument.item
     ids = [item.id for item in items]
+    points = [item.scale for item in items if isinstance(item.scale, int)]
     if instrument.is_ranking and instrument.is_paged:
         yield Problem((*keys, "is_paged"), "a ranking stands on one page")
     for index, item in enumerate(items):
@@ -135,6 +136,12 @@ def _instrument(keys: tuple[Key, ...], instrument: Instrument) -> Iterator[Probl
             yield Problem(
                 (*keys, "item", index, "scale"),
                 "rankings and other questions must be two instruments",
+            )
+        if isinstance(item.scale, int) and item.scale != points[0]:
+            yield Problem(
+                (*keys, "item", index, "scale"),
+                f"{item.id!r} has {item.scale} points, and the first of {instrument.name!r} "
+                f"{points[0]}: scales of other lengths must be another instrument",
             )
         if isinstance(item.scale, int) and len(instrument.labels) not in (0, item.scale):
             yield Problem(

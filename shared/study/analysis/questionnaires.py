@@ -43,7 +43,7 @@ def scales_of(tables: Tables, people: Sequence[str], conditions: Sequence[str]) 
     found: list[Scale] = []
     for instrument in tables.protocol.instrument:
         points = [item for item in instrument.item if isinstance(item.scale, int)]
-        if not points or len({item.scale for item in points}) > 1:
+        if not points:
             continue
         made = _scale(tables, instrument, points, people, conditions)
         found += [] if made is None else [made]

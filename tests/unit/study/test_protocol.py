@@ -104,6 +104,10 @@ WRONG = {
         'instruments = ["adjectives"]', 'instruments = ["comparison"]', "section[1].instruments",
         "after the second section",
     ),
+    "scales of two lengths in one instrument": (
+        'id = "PEOU"', 'id = "PEOU"\nscale = 7', "instrument[4].item[2].scale",
+        "'PEOU' has 7 points, and the first of 'tam' 5",
+    ),
     "a label too few": ('"Neutral", ', "", "instrument[4].labels", "5 points"),
     "reversed choices": (
         "is_several = true", "is_reversed = true", "instrument[2].item[1].is_reversed", "choices",
