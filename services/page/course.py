@@ -239,7 +239,8 @@ class Course:
             number=number,
         )
         self.results = [*self.results, result][-MAX_RESULTS:]
-        log.info("bout_fenced", bout=state.bout, opponent=result.opponent, score=state.score)
+        score = state.score if state.is_recorded else None
+        log.info("bout_fenced", bout=state.bout, opponent=result.opponent, score=score)
 
 
 def sides_of(cfg: PageConfig) -> tuple[Agent, ...]:

@@ -18,6 +18,8 @@ class RecorderConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     """Instants of the shown bout per second of the bout."""
     live_period: float = 0.25
     """Seconds from one batch of the live bout to the next."""
+    heart_between_bouts: bool = True
+    """Whether the file has the heart rate of the time between bouts; a study's session never."""
     file_period: float = 5.0
     """Seconds from one write to the file to the next; a kill loses at most this much."""
     archive: bool = True

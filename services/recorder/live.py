@@ -179,7 +179,7 @@ class Live:
             self._scene_of(self._shown, heard.rows)
 
     def _gather(self, heard: Heard, now: float) -> None:
-        """Keep for the file what belongs to a bout; of the time between bouts, the heart rate."""
+        """Keep for the file what belongs to a bout; of the time between, perhaps the heart rate."""
         if self._phase == "running" and self._is_recorded:
             self._files_until = now + LONG_PAUSE
         elif self._phase != "paused":
@@ -190,7 +190,8 @@ class Live:
             return
         if len(self._before) == self._before.maxlen:
             rows = self._before.popleft()
-            if (beats := rows.get(HEART_RATE.name)) is not None:
+            beats = rows.get(HEART_RATE.name) if self._cfg.heart_between_bouts else None
+            if beats is not None:
                 self._rows.append({HEART_RATE.name: beats})
         self._before.append(heard.rows)
 
@@ -220,7 +221,7 @@ class Live:
                 text = f"bout {state.bout}: {state.phase}" if state.bout else "ready for a bout"
                 if state.phase == "running" and not state.step:
                     text += f", {_short(state.antagonist)} v {_short(state.protagonist)}"
-                elif state.bout:
+                elif state.bout and state.is_recorded:
                     text += f" after {state.step} steps, score {state.score:+.0f}"
                 reason = f" ({state.reason})" if state.reason else ""
                 self._say("referee", text + reason, LEVELS.get(state.phase, "INFO"))

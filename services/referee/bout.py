@@ -167,7 +167,7 @@ class LiveBout:
             bout=self.fixture.bout,
             reason=reason,
             step=int(self.scores.step[0]),
-            score=float(self.scores.score[0]),
+            score=float(self.scores.score[0]) if self.fixture.is_recorded else None,
             missed_ticks=self.missed_ticks,
         )
         return True

@@ -69,7 +69,7 @@ class HeartLog:
         self, beats: Iterable[HeartRate], step: Step | None, progress: Progress,
         now_bpm: float | None,
     ) -> None:  # fmt: skip
-        """Write measurements down, none before the participant has agreed to it.
+        """Write measurements down, none before the consent and none of warm-up games.
 
         Args:
             beats: that have come.
@@ -84,7 +84,8 @@ class HeartLog:
         if now >= self._next_at:
             self._next_at = max(self._next_at + 1.0, now)
             self.recent.append(now_bpm)
-        if step is not None and progress.begun == step.id and progress.has_consent:
+        is_on = step is not None and progress.begun == step.id and progress.has_consent
+        if step is not None and is_on and step.kind != "warm_up":
             for beat in beats:
                 self._log.write(self._row(beat, step, progress))
                 self.rows += 1

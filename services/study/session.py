@@ -373,7 +373,10 @@ class Session:
 def game_ended(
     session: Session, step: Step, outcome: Outcome, reason: str, state: RefereeState | None
 ) -> GameEnded:
-    """Return the end of the attempt that runs, with what the referee said last of it."""
+    """Return the end of the attempt that runs, with what the referee said last of it.
+
+    Of a warm-up game no verdict is kept: the participant's page shows it, and that is all.
+    """
     running = session.progress.running
     assert running is not None, f"no game of {step.id} runs"
     start = running[1].start
@@ -381,7 +384,7 @@ def game_ended(
         attempt=start.attempt, bout=start.bout, policy=start.policy, outcome=outcome,
         reason=reason, archive=f"bouts/{start.bout}" if step.is_recorded else "",
     )  # fmt: skip
-    if state is None:
+    if state is None or not step.is_recorded:
         return ended
     return replace(
         ended,

@@ -165,6 +165,7 @@ def plan_of(study: Study, found: argparse.Namespace) -> Plan:
         "study.players": [[name, seat.player] for name, seat in seats.items()],
         "study.port": port,
         "page.is_led": True,
+        "recorder.heart_between_bouts": False,  # nobody has consented yet; hr.tsv has what follows
     }
     argv = [str(site)] if site is not None else []
     argv += ["--protagonist", STATIC, "--out", str(folder)]

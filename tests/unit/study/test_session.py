@@ -45,7 +45,13 @@ def test_a_session_is_walked_from_the_welcome_to_the_debrief(walked: Stand):
         "scripted:guard", "scripted:guard", "scripted:guard",
         "scripted:heuristic", "scripted:heuristic",
     ]  # fmt: skip
-    assert all(row.seconds == pytest.approx(1.0) and row.steps == 100 for row in games)
+    warm_up, *counted = games
+    assert all(row.seconds == pytest.approx(1.0) and row.steps == 100 for row in counted)
+    assert [row.score for row in counted] == [
+        state.score for state in stand.bouts if state.phase == "finished" and state.is_recorded
+    ]
+    kept = ("score", "attack_steps", "penalty_steps", "camping_steps", "steps", "seconds")
+    assert [getattr(warm_up, name) for name in kept] == [None] * 6
     (ranks,) = [stand.whats("ranking")[0].ranks]
     assert ranks == {"difficulty": {1: 1, 2: 2}}
     rows = read_table(stand.session_folder / "rankings.tsv", RankingRow)
@@ -76,7 +82,7 @@ def test_the_referee_and_the_journal_tell_the_same_games(walked: Stand):
     judged = {state.bout: state for state in stand.bouts if state.phase == "finished"}
     ended = stand.whats("game_ended")
     assert [event.bout for event in ended] == [name for name in judged if "-a" in name]
-    for event in ended:
+    for event in ended[1:]:  # of the warm-up game nothing is kept
         assert (event.score, event.steps) == (judged[event.bout].score, judged[event.bout].step)
 
 
@@ -254,6 +260,7 @@ def test_heart_rates_are_written_down_where_the_session_stood(walked: Stand):
     stand = walked
     rows = read_table(stand.session_folder / "hr.tsv", HeartRateRow)
     assert {row.step for row in rows} >= {"baseline-walking", "s1-rest-01", "explore"}
+    assert "warm-up-1" not in {row.step for row in rows}
     playing = [row for row in rows if row.game]
     assert all(row.attempt == 1 and row.policy.startswith("scripted:") for row in playing)
     assert {row.condition for row in rows if row.section == 1} == {
