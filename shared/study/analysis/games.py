@@ -22,7 +22,8 @@ class Games:
     conditions: tuple[str, ...]
     """As the tables call them, in alphabetical order, those that come first for everybody first."""
     first: tuple[str, ...]
-    """Conditions that everybody met in the same section: nothing tells them from that section."""
+    """Conditions that come first for everybody, by the protocol's ``order.first``: nothing tells
+    them from their section."""
     by_section: Floats
     """float64[n, S, G]."""
     by_condition: Floats
@@ -68,7 +69,7 @@ def games_of(tables: Tables) -> Games:
     people = tuple(dict.fromkeys(tables.participants["participant"]))
     protocol = tables.protocol
     orders = orders_of(tables)
-    conditions, first = _conditions(orders)
+    conditions, first = _conditions(orders, len(protocol.order.first))
     shape = (len(people), len(protocol.section), max(s.games for s in protocol.section))
     by_section, by_condition = (
         np.full(shape, np.nan),
@@ -117,16 +118,13 @@ def orders_of(tables: Tables) -> dict[str, tuple[str, ...]]:
     return {person: tuple(order.split(",")) for person, order in rows if order}
 
 
-def _conditions(orders: Mapping[str, Sequence[str]]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _conditions(
+    orders: Mapping[str, Sequence[str]], first: int
+) -> tuple[tuple[str, ...], tuple[str, ...]]:  # fmt: skip
+    """Return all conditions, and those of the first sections, which are the same for everybody."""
     found = sorted({condition for order in orders.values() for condition in order})
-    shortest = min((len(order) for order in orders.values()), default=0)
-    fixed: list[str] = []
-    if len(orders) > 1:
-        for section in range(shortest):
-            met = {order[section] for order in orders.values()}
-            fixed += sorted(met) if len(met) == 1 else []
-    first = tuple(fixed) if len(fixed) < len(found) else ()
-    return (*first, *(name for name in found if name not in first)), first
+    begin = tuple(next(iter(orders.values()), ())[:first])
+    return (*begin, *(name for name in found if name not in begin)), begin
 
 
 def _plain(column: Any) -> list[Any]:
