@@ -72,7 +72,7 @@ class Fencing:
         self.io = RobotIo(cfg, parts, period, io_bus, self.clock)
         loader = Loader("protagonist", Fit.of(action, period, None), arena, Path())
         self.policy = Policy(
-            PolicyConfig(protagonist=player_of(protagonist)), "protagonist", loader.load,
+            PolicyConfig(protagonist=player_of(protagonist)), "protagonist", loader,
             Acting("protagonist", target, action, 0), policy_bus, self.clock,
         )  # fmt: skip
         board = functools.partial(Scoreboard, 1, RuleBook(), bat_of(sim), target)

@@ -6,6 +6,7 @@ clock (moved by hand) are others.
 """
 
 import functools
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Final, Literal, Protocol
 
@@ -62,7 +63,7 @@ class VirtualSite:
         self, folder: Path, robot: RobotIoConfig, safety: SafetyConfig, sim: SimConfig, *,
         rules: RuleBook | None = None, policy: PolicyConfig | None = None,
         heart: HeartRateSource | None = None, recorder: RecorderConfig | None = None,
-        clock: ManualClock | None = None,
+        clock: ManualClock | None = None, players: Iterable[str] = (),
     ) -> None:  # fmt: skip
         """Start them.
 
@@ -76,6 +77,7 @@ class VirtualSite:
             heart: the strap of the person who plays, if one is worn.
             recorder: what is recorded; by default everything but the live view.
             clock: that the site moves on; one of its own where none is given.
+            players: that the policy may be asked to be, besides scripted ones.
         """
         self.clock = clock or ManualClock(BEGAN)
         hub = MemoryHub(self.clock, max_messages=4096)
@@ -96,10 +98,10 @@ class VirtualSite:
         self.policy: Policy | None = None
         if policy is not None:
             fit = Fit.of(action, period, policy.model or None)
-            loader = Loader("protagonist", fit, arena_of(sim, action), folder)
+            loader = Loader("protagonist", fit, arena_of(sim, action), folder, frozenset(players))
             acting = Acting("protagonist", target, action, policy.seed)
             self.policy = Policy(
-                policy, "protagonist", loader.load, acting, self._join("policy"), self.clock
+                policy, "protagonist", loader, acting, self._join("policy"), self.clock
             )
         model = FencingModel.build(sim)
         about = about_of(folder, model, {"game": rules, "sim": sim, "action": action}, "")

@@ -1,6 +1,8 @@
 """Finds the player that a reference names, and refuses one that does not fit this process."""
 
 import dataclasses
+import os
+import stat
 from pathlib import Path
 
 from shared.errors import SnapshotError
@@ -31,6 +33,8 @@ class Loader:
     arena: Arena
     run: Path
     """Folder of this run, in which ``sha256:`` references are looked up."""
+    listed: frozenset[str] = frozenset()
+    """What a settings file names as players: what may be asked for over the bus by its path."""
 
     def load(self, text: str) -> NamedPlayer:
         """Return the player that a text names.
@@ -53,6 +57,38 @@ class Loader:
         snapshot.check_fits(self.fit)
         policy = GaussianPolicy(snapshot.weights)
         return NamedPlayer(snapshot.reference, SnapshotPlayer(policy, stochastic=False))
+
+    def load_asked(self, text: str) -> NamedPlayer:
+        """Return the player that somebody on the bus names.
+
+        Who is on the network may choose among players, not among this machine's files: whether a
+        file is there cannot be told from the answer.
+
+        Args:
+            text: ``scripted:NAME``, ``sha256:HASH`` of a snapshot that this run has or that is
+                listed, or a text that is listed.
+
+        Raises:
+            SnapshotError: it is none of these, it is damaged, or it does not fit.
+        """
+        found = text
+        if text.startswith(_DIGEST_PREFIX):
+            found = self._known_file(f"{digest_of(text)}.safetensors")
+        elif not text.startswith(SCRIPTED_PREFIX) and text not in self.listed:
+            found = ""
+        if not found:
+            raise SnapshotError(
+                f"there is no player {text[:80]!r} to be had over the bus: ask for scripted:NAME, "
+                "sha256:HASH of a snapshot in this run's folder, or one that [policy], "
+                "[page] players or [study] players of this process's settings names"
+            )
+        return self.load(found)
+
+    def _known_file(self, name: str) -> str:
+        """Return the path of a snapshot file among those of this run and those listed, or ""."""
+        listed = (Path(text) for text in sorted(self.listed) if text.endswith(f"/{name}"))
+        kept = (self.run / "snapshots" / name, *listed)
+        return next((str(path) for path in kept if path.is_file()), "")
 
     def _find(self, text: str) -> Snapshot:
         if text.startswith(_DIGEST_PREFIX):
@@ -84,11 +120,18 @@ def _newest(run: Path, agent: Agent) -> Snapshot:
 
 def _read(path: Path) -> bytes:
     try:
-        with path.open("rb") as file:
+        with open(path, "rb", opener=_open) as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise ValueError("no regular file")
             return file.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
+    except (OSError, ValueError) as error:  # ValueError: no file, or a path with a zero byte
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise SnapshotError(
             f"snapshot {path} cannot be read ({reason}); give scripted:NAME, a .safetensors file, "
             "RUN:antagonist, RUN:protagonist or sha256:HASH"
         ) from None
+
+
+def _open(path: str, flags: int) -> int:
+    """Open without waiting: a FIFO would stop this process, and the robot with it."""
+    return os.open(path, flags | os.O_NONBLOCK)

@@ -1,12 +1,10 @@
 """The policy's work: the newest bat states in, one offset out, and new players between bouts."""
 
-from collections.abc import Callable
-
 import structlog
 
 from services.policy.acting import HOLD, Acting
 from services.policy.config import PolicyConfig
-from services.policy.loading import NamedPlayer
+from services.policy.loading import Loader
 from shared.bus.base import Bus
 from shared.clock import Clock
 from shared.errors import SnapshotError
@@ -43,15 +41,15 @@ class Policy:
     """
 
     def __init__(
-        self, cfg: PolicyConfig, agent: Agent, load: Callable[[str], NamedPlayer], acting: Acting,
-        bus: Bus, clock: Clock,
+        self, cfg: PolicyConfig, agent: Agent, loader: Loader, acting: Acting, bus: Bus,
+        clock: Clock,
     ) -> None:  # fmt: skip
         """Load the player and join the bus.
 
         Args:
             cfg: who plays, and what is stale.
             agent: the side.
-            load: finds a player by what people call it; raises ``SnapshotError``.
+            loader: finds a player by what people call it.
             acting: encoder and decoder.
             bus: this process's end of the bus.
             clock: measures lateness.
@@ -61,8 +59,8 @@ class Policy:
         """
         self._cfg = cfg
         self._agent: Agent = agent
-        self._load = load
-        self._named = load(cfg.antagonist if agent == "antagonist" else cfg.protagonist)
+        self._loader = loader
+        self._named = loader.load(cfg.antagonist if agent == "antagonist" else cfg.protagonist)
         self._acting = acting
         self._bus = bus
         self._clock = clock
@@ -193,7 +191,7 @@ class Policy:
             reason = f"a bout is {self._phase}: players change between bouts only"
         else:
             try:
-                self._named = self._load(asked.player)
+                self._named = self._loader.load_asked(asked.player)
             except SnapshotError as error:
                 reason = str(error)
         if reason:

@@ -77,7 +77,7 @@ class Rehearsal:
         policy = PolicyConfig(protagonist="scripted:static", seed=1000 * plan.seed + number)
         self.site = VirtualSite(
             folder, plan.robot_io, plan.safety, plan.sim, rules=plan.game, policy=policy,
-            heart=self.person, recorder=recorder, clock=clock,
+            heart=self.person, recorder=recorder, clock=clock, players=plan.players.values(),
         )  # fmt: skip
         self.person.join(self.site.join("page"))
         asks = asks_of(journal)

@@ -32,7 +32,11 @@ def test_a_recorded_bout_is_scored_live_as_the_actor_scored_it(
     for name, made in (("wrong", wrong), ("right", right)):
         (tmp_path / f"{name}.safetensors").write_bytes(made.payload)
     stage.start("referee", *PATIENT)
-    stage.start("policy", 'policy.protagonist="scripted:guard"', agent="protagonist")
+    offered = ", ".join(
+        f'["{name}", "{tmp_path / name}.safetensors"]' for name in ("wrong", "right")
+    )
+    players = ('policy.protagonist="scripted:guard"', f"page.players=[{offered}]")
+    stage.start("policy", *players, agent="protagonist")
     stage.publish()
     stage.until(lambda: stage.offsets)
     assert not np.any(stage.offsets[-1].offset)

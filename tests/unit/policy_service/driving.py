@@ -30,8 +30,8 @@ ACTION = ActionConfig()
 FIT = Fit.of(ACTION, SIM.control_timestep, None)
 
 
-def loader(agent: Agent, run: Path, fit: Fit = FIT) -> Loader:
-    return Loader(agent, fit, arena_of(SIM, ACTION), run)
+def loader(agent: Agent, run: Path, fit: Fit = FIT, *listed: str) -> Loader:
+    return Loader(agent, fit, arena_of(SIM, ACTION), run, frozenset(listed))
 
 
 def store(run: Path, *snapshots: Snapshot) -> None:
@@ -52,7 +52,9 @@ def en_garde() -> np.ndarray:
 class Stand:
     """The policy and everybody it talks to."""
 
-    def __init__(self, run: Path, player: str, agent: Agent = "protagonist") -> None:
+    def __init__(
+        self, run: Path, player: str, agent: Agent = "protagonist", listed: str = ""
+    ) -> None:
         self.clock = ManualClock(1000.0)
         self._hub = MemoryHub(self.clock)
         self.bus = self._hub.join("others")
@@ -60,7 +62,7 @@ class Stand:
         acting = Acting(agent, target_of(SIM), ACTION, seed=0)
         self.agent: Agent = agent
         self.policy = Policy(
-            PolicyConfig(**{agent: player}), agent, loader(agent, run).load, acting,
+            PolicyConfig(**{agent: player}), agent, loader(agent, run, FIT, listed), acting,
             self._hub.join("policy-0"), self.clock,
         )  # fmt: skip
         self._offsets = self.bus.subscribe(OFFSET, agent=agent)

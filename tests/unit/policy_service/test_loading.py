@@ -1,9 +1,10 @@
+import os
 from pathlib import Path
 
 import msgspec
 import pytest
 
-from services.policy.__main__ import build
+from services.policy.__main__ import build, listed
 from services.policy.config import PolicyConfig
 from shared.bus.memory import MemoryHub
 from shared.clock import ManualClock
@@ -76,7 +77,7 @@ def test_what_does_not_fit_is_refused_by_its_field(change, reason: str, tmp_path
         ("sha256:12", "is no snapshot; expected sha256:<64 hex digits>"),
         ("nowhere:protagonist", "nowhere holds no snapshot of the protagonist"),
         ("a\0b", "cannot be read"),
-        (".", "cannot be read (Is a directory)"),
+        (".", "cannot be read ("),
     ],
 )
 def test_who_cannot_be_found_is_said_in_one_line(text: str, reason: str, tmp_path: Path):
@@ -84,6 +85,23 @@ def test_who_cannot_be_found_is_said_in_one_line(text: str, reason: str, tmp_pat
         loader("protagonist", tmp_path).load(text)
     assert reason in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_fifo_stops_nobody(tmp_path: Path):
+    os.mkfifo(tmp_path / "fifo")
+    with pytest.raises(SnapshotError, match="cannot be read \\(no regular file\\)"):
+        loader("protagonist", tmp_path).load(str(tmp_path / "fifo"))
+
+
+def test_what_the_page_and_the_study_offer_may_be_asked_for(tmp_path: Path):
+    site = tmp_path / "site.toml"
+    site.write_text(
+        '[policy]\nprotagonist = "mine"\n[page]\nport = 0\nplayers = [["a", "/paths/a"]]\n'
+        '[study]\nplayers = [["b", "runs/b:protagonist"]]\n'
+    )
+    args = parse_args("policy", (str(site), "--run", str(tmp_path), "--agent", "protagonist"))
+    found = listed(args, args.section("policy", PolicyConfig))
+    assert found == {"scripted:stab", "mine", "/paths/a", "runs/b:protagonist"}
 
 
 def built(*argv: str):

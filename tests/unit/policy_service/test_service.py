@@ -1,3 +1,4 @@
+import os
 from pathlib import Path
 
 import numpy as np
@@ -202,14 +203,46 @@ def test_players_change_between_bouts_only(tmp_path: Path):
 
 
 def test_a_player_that_does_not_fit_changes_nothing(tmp_path: Path):
-    stand = Stand(tmp_path, "scripted:static")
     path = tmp_path / "wide.safetensors"
+    stand = Stand(tmp_path, "scripted:static", listed=str(path))
     path.write_bytes(snapshot(agent="protagonist", offset_bound_m=0.3).payload)
     reply = stand.ask(str(path))
     assert not reply.accepted
     assert "its offset_bound_m is 0.3, this process needs 0.0375" in reply.reason
     assert reply.player == "scripted:static"
     assert stand.policy.health().last_error == reply.reason
+
+
+def test_what_is_asked_for_cannot_be_told_from_what_is_not_there(tmp_path: Path):
+    """Whoever is on the bus learns nothing of the files of the robot's machine."""
+    store(tmp_path / "elsewhere", MADE["protagonist"])
+    secret = tmp_path / "secret.safetensors"
+    secret.write_bytes(MADE["protagonist"].payload)
+    os.mkfifo(tmp_path / "fifo")
+    stand = Stand(tmp_path / "run", "scripted:static")
+    answers: set[str] = set()
+    for text in (
+        str(secret), str(tmp_path / "absent"), str(tmp_path / "fifo"), str(tmp_path), "/etc/passwd",
+        f"{tmp_path / 'elsewhere'}:protagonist", f"{tmp_path / 'absent'}:protagonist",
+        f"sha256:{'0' * 64}", MADE["protagonist"].reference, "a\0b", "", "x" * 2000,
+    ):  # fmt: skip
+        reply = stand.ask(text)
+        assert not reply.accepted
+        assert reply.player == "scripted:static"
+        answers.add(reply.reason.replace(repr(text[:80]), "?"))
+    (answer,) = answers
+    assert answer.startswith("there is no player ? to be had over the bus: ask for scripted:NAME")
+
+
+@pytest.mark.parametrize("is_by_hash", [False, True])
+def test_what_the_settings_name_may_be_asked_for(tmp_path: Path, is_by_hash: bool):
+    made = MADE["protagonist"]
+    store(tmp_path / "elsewhere", made)
+    path = tmp_path / "elsewhere" / "snapshots" / f"{made.digest}.safetensors"
+    stand = Stand(tmp_path / "run", "scripted:static", listed=str(path))
+    reply = stand.ask(made.reference if is_by_hash else str(path))
+    assert reply.accepted, reply.reason
+    assert reply.player == made.reference
 
 
 def test_a_bout_left_behind_by_a_dead_referee_does_not_block_a_change(tmp_path: Path):
