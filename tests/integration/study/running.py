@@ -28,7 +28,7 @@ from tests.integration.training.training import ROOT, processes_of
 
 X = TypeVar("X")
 QUICK = (
-    "recorder.live=false", "recorder.file=false", "safety.ramp=0.5", "safety.command_hold=0.5",
+    "recorder.live=false", "safety.ramp=0.5", "safety.command_hold=0.5",
     "safety.command_trip=2.0", "safety.tracker_hold=0.5", "safety.state_hold=0.5",
     "safety.state_trip=0.5", "policy.stale_after=1.0", "policy.referee_silence=2.0",
     "robot_io.referee_silence=2.0", "referee.stale_after=1.0", "referee.void_after=10.0",
@@ -129,11 +129,14 @@ class Run:
 
 
 @contextlib.contextmanager
-def running(study: Study, participant: str, *words: str) -> Iterator[Run]:
+def running(
+    study: Study, participant: str, *words: str, has_recording: bool = False
+) -> Iterator[Run]:  # fmt: skip
     """Run a session, and leave no process of it behind."""
     folder = study.folder
     overrides = (
-        *QUICK, "robot_io.tracker=replay", f"robot_io.replay={folder.with_suffix('.bat.npy')}",
+        *QUICK, f"recorder.file={str(has_recording).lower()}", "robot_io.tracker=replay",
+        f"robot_io.replay={folder.with_suffix('.bat.npy')}",
         "heart_rate.source=replay", f"heart_rate.file={folder.with_suffix('.heart.csv')}",
     )  # fmt: skip
     command = [

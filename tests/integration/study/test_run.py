@@ -1,9 +1,11 @@
 """A whole session: the command, every process, the real bus, and people at both pages."""
 
 import signal
+import time
 from pathlib import Path
 
 import pytest
+from rerun.chunk import RrdReader
 
 from shared.game.recount import recount
 from shared.game.rules import RuleBook
@@ -15,7 +17,9 @@ from shared.study.recorded import GAMES, HEART_RATE
 from shared.study.rows import GameRow, HeartRateRow
 from shared.study.tsv import read_table
 from shared.telemetry.archive import archived_bouts, load_bout
-from tests.integration.study.running import People, events_of, make, running
+from shared.telemetry.live import HEART_PATH
+from shared.telemetry.rrd import recordings
+from tests.integration.study.running import People, Run, events_of, make, running
 
 pytestmark = [pytest.mark.zenoh, pytest.mark.slow, pytest.mark.timeout(400)]
 
@@ -23,11 +27,33 @@ pytestmark = [pytest.mark.zenoh, pytest.mark.slow, pytest.mark.timeout(400)]
 RULES = RuleBook(bout_steps=150)
 
 
+def wait_for_heart(people: People, run: Run, seconds: float = 60.0) -> None:
+    """Wait until the sensor was heard for a while, and say nothing at the pages."""
+    deadline = time.monotonic() + seconds
+    page = people.researcher
+    while sum(rate is not None for rate in page.view.get("heart", {}).get("recent", ())) < 3:
+        page.pump()
+        assert run.process.poll() is None, run.said
+        assert time.monotonic() < deadline, page.view.get("heart")
+        time.sleep(0.05)
+
+
+def heart_times(path: Path) -> list[int]:
+    """Return the wall clock of every heart rate in a recording (ns)."""
+    return [
+        at
+        for chunk in RrdReader(path).stream()
+        if chunk.entity_path == f"/{HEART_PATH}" and not chunk.is_static
+        for at in chunk.to_record_batch().column("wall_time").cast("int64").to_pylist()
+    ]
+
+
 def test_a_session_is_run_stopped_and_gone_on_with_to_its_end(tmp_path: Path):
     study = make(tmp_path / "study")
     folder = study.session_folder("sub-01")
     people = People(folder)
-    with running(study, "sub-01") as run:
+    with running(study, "sub-01", has_recording=True) as run:
+        wait_for_heart(people, run)  # the sensor is on before anybody has agreed to it
         people.until(lambda: "s1-g01" in replay(events_of(study)).done, run)
         run.process.send_signal(signal.SIGINT)
         code, said = run.finish()
@@ -35,7 +61,7 @@ def test_a_session_is_run_stopped_and_gone_on_with_to_its_end(tmp_path: Path):
     assert "say the same command again" in said
     assert "researcher: http" in said
     assert "token=" in said
-    with running(study, "sub-01") as run:
+    with running(study, "sub-01", has_recording=True) as run:
         people.until(lambda: replay(events_of(study)).state == "ended", run)
         code, said = run.finish()
     people.close()
@@ -65,8 +91,16 @@ def test_a_session_is_run_stopped_and_gone_on_with_to_its_end(tmp_path: Path):
             counted = recount(archived[row.bout], RULES, bat_of(sim), target_of(sim))
             assert float(counted.score[0]) == row.score
 
+    (consented,) = [event for event in events_of(study) if event.kind == "consented"]
+    in_recording = [at for path in recordings(folder) for at in heart_times(path)]
+    assert len(recordings(folder)) == 2
+    assert in_recording
+    assert min(in_recording) > consented.wall_ns
+    assert [row.score for row in finished if not row.is_recorded] == [None]
+
     beats = read_table(folder / HEART_RATE, HeartRateRow)
     assert {row.game for row in beats} >= {0, 1}
+    assert "warm-up-1" not in {row.step for row in beats}
     assert len({(row.wall, row.t_ns) for row in beats}) == len(beats)
     with running(study, "sub-01") as run:
         code, said = run.finish()
