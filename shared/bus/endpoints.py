@@ -14,10 +14,12 @@ import structlog
 
 from shared.bus.base import NoAnswer, Refused
 from shared.bus.counters import Counters
+from shared.bus.keys import fields_in
 from shared.bus.queues import Fifo, Newest
 from shared.clock import Clock
 from shared.errors import MessageError
 from shared.messages.message import Message
+from shared.messages.texts import clipped
 from shared.messages.topics import Qos, Service, Topic
 from shared.messages.wire import decode, encode
 
@@ -42,6 +44,20 @@ def _decoded(topic: Topic[Out], payload: bytes) -> Out:
 @functools.lru_cache(maxsize=16)
 def _shared(message: type[Message], payload: bytes, max_bytes: int) -> Message:
     return decode(message, payload, max_bytes)
+
+
+def _check_claims(topic: Topic[Any], key: str, message: Message) -> None:
+    """Refuse a message that says to be of somebody else than its key does.
+
+    Who may write under a key is checked; what is written there is not, by anybody but this.
+
+    Raises:
+        MessageError: a field of the message has another value than the key's field of its name.
+    """
+    for name, value in fields_in(topic.key, key).items():
+        claimed = getattr(message, name, value)
+        if str(claimed).replace("_", "-") != value.replace("_", "-"):
+            raise MessageError(f"{name} is {claimed!r} in a value on {key}")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,8 +101,8 @@ class Values(Generic[Out]):
         self._topic = topic
         self._on_close = on_close
         self._dropped = 0
-        self._newest = Newest[bytes]() if topic.qos is Qos.LATEST else None
-        self._fifo = Fifo[bytes](host.max_messages, host.max_bytes)
+        self._newest = Newest[tuple[str, bytes]]() if topic.qos is Qos.LATEST else None
+        self._fifo = Fifo[tuple[str, bytes]](host.max_messages, host.max_bytes)
 
     @property
     def max_bytes(self) -> int:
@@ -108,22 +124,24 @@ class Values(Generic[Out]):
             payload: the encoded message.
         """
         if self._newest is None:
-            dropped = self._fifo.push(payload, len(payload))
+            dropped = self._fifo.push((key, payload), len(payload))
             self._dropped += dropped
             self._host.counts.add("dropped_values", dropped)
-        elif not self._newest.offer(key, boot, count, payload):
+        elif not self._newest.offer(key, boot, count, (key, payload)):
             return
         self._host.wake()
 
     def take(self) -> Out | None:
         """Return the next value, or None."""
         queue = self._newest or self._fifo
-        while (payload := queue.pop()) is not None:
+        while (item := queue.pop()) is not None:
+            key, payload = item
             try:
                 message = _decoded(self._topic, payload)
+                _check_claims(self._topic, key, message)
             except MessageError as error:
                 self._host.counts.add("refused_messages")
-                log.warning("value_refused", key=self.pattern, reason=str(error))
+                log.warning("value_refused", key=key, reason=clipped(str(error)))
                 continue
             self._host.counts.taken(len(payload))
             return message

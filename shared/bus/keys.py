@@ -42,6 +42,23 @@ def fields_of(template: str) -> set[str]:
     return {name for _, name, _, _ in string.Formatter().parse(template) if name}
 
 
+@functools.lru_cache(maxsize=4096)
+def fields_in(template: str, key: str) -> dict[str, str]:
+    """Return what a key has in the place of each field of its template; nothing where none fits.
+
+    Args:
+        template: such as ``learner/{agent}/rollout``.
+        key: the whole one, which begins with what the template leaves out.
+    """
+    want = template.split("/")
+    have = key.split("/")[-len(want) :]
+    return {
+        chunk[1:-1]: value
+        for chunk, value in zip(want, have, strict=False)
+        if chunk.startswith("{") and chunk.endswith("}")
+    }
+
+
 def check_chunk(what: str, value: str) -> None:
     """Refuse a text that cannot be one chunk of a key.
 

@@ -128,6 +128,24 @@ def test_a_field_left_out_matches_every_key_and_each_keeps_its_newest(world: Any
     assert one.take() is None
 
 
+def test_a_value_that_claims_to_be_anothers_is_refused_and_counted(world: Any) -> None:
+    writer, reader = world.join("actor-1"), world.join("operator-0")
+    values = reader.subscribe(STATUS)
+    honest = ServiceStatus(role="robot_io", name="actor-1", boot="b", pid=1, host="h", state="up")
+    writer.publish(STATUS, honest, role="robot-io", name="actor-1")
+    assert world.until(values.take) == honest
+    for key in ({"role": "actor", "name": "actor-1"}, {"role": "robot-io", "name": "robot-io-0"}):
+        writer.publish(STATUS, honest, **key)
+    taken: list[ServiceStatus | None] = []
+
+    def both_refused() -> bool:
+        taken.append(values.take())
+        return reader.counters["refused_messages"] == 2
+
+    assert world.until(both_refused)
+    assert not any(taken)
+
+
 def test_a_restarted_writer_is_heard(world: Any) -> None:
     reader = world.join("actor-0")
     values = reader.subscribe(SCHEDULE)
