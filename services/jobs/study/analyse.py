@@ -47,7 +47,7 @@ def summary_text(results: Results) -> str:
     """Return the sentences of all chapters on one screen."""
     lines = [results.title, ""]
     for chapter in results.chapters:
-        if chapter.says:
-            text = f"{chapter.title}: {' '.join(chapter.says[: chapter.headlines])}"
+        if said := chapter.says[: chapter.headlines]:
+            text = f"{chapter.title}: {' '.join(said)}"
             lines += [*textwrap.wrap(text, WIDTH, subsequent_indent="  "), ""]
     return "\n".join(lines).rstrip()

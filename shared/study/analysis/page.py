@@ -30,9 +30,9 @@ def report_page(title: str, is_blinded: bool, methods: Methods, chapters: Sequen
 def _head(title: str, is_blinded: bool, chapters: Sequence[Chapter]) -> Node:
     shown = "conditions under blinded labels" if is_blinded else "conditions by name"
     said = [
-        tag("li", tag("b", f"{chapter.title}. "), " ".join(chapter.says[: chapter.headlines]))
+        tag("li", tag("b", f"{chapter.title}. "), " ".join(said))
         for chapter in chapters
-        if chapter.says
+        if (said := chapter.says[: chapter.headlines])
     ]
     return [
         tag("h1", title),

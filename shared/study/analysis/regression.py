@@ -21,7 +21,14 @@ from statsmodels.tools.tools import add_constant
 from shared.study.analysis.correlation import spearman
 from shared.study.analysis.finding import Check, Estimate, Finding, check, missing_text, not_done
 from shared.study.analysis.intervals import TAIL, correlation_estimate
-from shared.study.analysis.paired import FEWEST, Named, normality, one_sample, paired
+from shared.study.analysis.paired import (
+    FEWEST,
+    NOTHING_VARIES,
+    Named,
+    normality,
+    one_sample,
+    paired,
+)
 
 Floats = NDArray[np.float64]
 FEWEST_GAMES = 3
@@ -127,7 +134,6 @@ def welch(first: Floats, second: Floats, question: str) -> Finding:
     interval = found.confidence_interval(1.0 - 2.0 * TAIL)
     difference = float(first.mean() - second.mean())
     pooled_sd = np.sqrt((first.var(ddof=1) + second.var(ddof=1)) / 2.0)
-    spread: Any = stats.levene(first, second, center="median")
     return Finding(
         question=question,
         test=test,
@@ -142,12 +148,19 @@ def welch(first: Floats, second: Floats, question: str) -> Finding:
             high=float(interval.high), method="t",
         ),
         effect=Estimate(name="d", value=difference / float(pooled_sd)),
-        checks=(
-            check("variances are equal", "Levene (median)", float(spread.statistic),
-                  float(spread.pvalue)),
-        ),
+        checks=_levene(first, second),
         note="people are taken as two groups; equal variances are not assumed",
     )  # fmt: skip
+
+
+def _levene(first: Floats, second: Floats) -> tuple[Check, ...]:
+    """Return the test of equal variance; nothing where no distance from a median varies."""
+    away = [np.abs(group - np.median(group)) for group in (first, second)]
+    if all(np.ptp(each) <= NOTHING_VARIES * max(1.0, float(each.max())) for each in away):
+        return ()
+    found: Any = stats.levene(first, second, center="median")
+    test = "Levene (median)"
+    return (check("variances are equal", test, float(found.statistic), float(found.pvalue)),)
 
 
 def _clustered(x: Floats, y: Floats, person: NDArray[np.intp], question: str) -> Finding:
@@ -159,6 +172,9 @@ def _clustered(x: Floats, y: Floats, person: NDArray[np.intp], question: str) ->
     fit: Any = OLS(y, add_constant(x)).fit(
         cov_type="cluster", cov_kwds={"groups": person, "df_correction": True}, use_t=True
     )
+    slope = float(fit.params[1])
+    if not fit.cov_params()[1, 1] > (NOTHING_VARIES * max(1.0, abs(slope))) ** 2:
+        return not_done(question, test, people, "people are all alike, nothing varies")
     low, high = fit.conf_int(2.0 * TAIL)[1]
     return Finding(
         question=question,
@@ -169,7 +185,7 @@ def _clustered(x: Floats, y: Floats, person: NDArray[np.intp], question: str) ->
         df=(people - 1.0,),
         p=float(fit.pvalues[1]),
         estimate=Estimate(
-            name=SLOPE, value=float(fit.params[1]), low=float(low), high=float(high),
+            name=SLOPE, value=slope, low=float(low), high=float(high),
             method="cluster sandwich",
         ),
     )  # fmt: skip

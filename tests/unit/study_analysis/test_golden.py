@@ -1,19 +1,22 @@
 """Studies made to have the paper's numbers give the paper's numbers, to the printed digit."""
 
 import csv
+import dataclasses
 
 import msgspec
 import numpy as np
 import pytest
 
-from services.jobs.study.analyse import main
+from services.jobs.study.analyse import main, summary_text
 from shared.errors import RiposteError
 from shared.study.analysis.chapters.acceptance import acceptance_chapter
 from shared.study.analysis.chapters.answers import answers_chapter
 from shared.study.analysis.chapters.heart_rate import heart_rate_chapter
 from shared.study.analysis.chapters.rankings import rankings_chapter
 from shared.study.analysis.games import games_of
-from shared.study.analysis.results import Results, analyse_folder
+from shared.study.analysis.methods import Methods
+from shared.study.analysis.page import report_page
+from shared.study.analysis.results import ChapterResults, Results, analyse_folder
 from shared.study.tables import load_study
 from tests.unit.study.made import play, study_in
 from tests.unit.study_analysis.made import Person, line_scores, write_study
@@ -238,6 +241,28 @@ def test_a_study_of_which_only_one_person_has_played_is_analysed(tmp_path):
     assert found.chapter("people").says[0].startswith("1 of 16 planned people")
     assert "1 attempt left out: void, repeated or not ended" in found.chapter("people").says
     assert all(f.p is None for f in found.chapter("scores").findings)
+
+
+def test_a_chapter_without_headlines_has_no_line_in_either_summary(study_one):
+    told = dataclasses.replace(study_one["rankings"], pictures=())
+    silent = dataclasses.replace(
+        study_one["heart-rate"], says=("16 people left out",), headlines=0, pictures=()
+    )
+    methods = Methods(
+        packages={}, python="", commit="", seed=0, protocol=(), config=(), policies=(), commits=()
+    )
+    page = report_page("A study", True, methods, [silent, told])
+    assert "<b>Rankings. </b>" in page
+    assert "<b>Heart rate. </b>" not in page
+    chapters = tuple(
+        ChapterResults(key=c.key, title=c.title, says=c.says, headlines=c.headlines, findings=(),
+                       tables=())
+        for c in (silent, told)
+    )  # fmt: skip
+    found = Results(study="s", title="A study", is_blinded=True, people=16, methods=methods,
+                    chapters=chapters)  # fmt: skip
+    assert "Rankings: " in summary_text(found)
+    assert "Heart rate" not in summary_text(found)
 
 
 def test_a_study_of_which_nobody_has_played_is_refused(tmp_path):

@@ -223,6 +223,21 @@ def test_the_check_of_equal_variance_is_lagrange_multiplier_of_squares_on_game()
     assert found.p == pytest.approx(float(stats.chi2.sf(statistic, 1)))
 
 
+def test_people_who_are_all_alike_have_no_line_clustered_by_person_and_warn_nobody():
+    cube = np.tile(100.0 + GAMES, (3, 1))
+    cube[:, 4] += 7.0  # off the line, everybody alike
+    found = pooled(GAMES, cube, "q")
+    assert found.estimate is not None
+    assert found.beside[0].p is None
+    assert found.beside[0].note == "not done: people are all alike, nothing varies"
+
+
+def test_groups_of_two_have_no_check_of_variance_and_warn_nobody():
+    found = welch(np.array([1.1, 3.4]), np.array([2.2, 8.7]), "q")
+    assert found.p is not None
+    assert found.checks == ()
+
+
 def test_slopes_of_people_are_their_own_least_squares():
     cube = people(15, slope=5.0)
     cube[0, :4] = np.nan
