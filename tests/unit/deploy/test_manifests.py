@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +12,21 @@ import pytest
 import yaml
 
 from shared.messages.topics import CERTIFIED
-from tests.unit.deploy.found import KUBERNETES, OWN_IMAGES, documents, manifests, pods
+from tests.unit.deploy.found import (
+    KUBERNETES,
+    OWN_IMAGES,
+    ROOT,
+    code_blocks,
+    documents,
+    manifests,
+    pods,
+)
 
 VERSION = "1.32"
 KUSTOMIZATIONS = sorted(KUBERNETES.parent.rglob("kustomization.yaml"))
 OVERLAYS = sorted(path for path in (KUBERNETES / "overlays").iterdir() if path.is_dir())
 ALL = list(manifests())
+DEPLOY_PAGE = ROOT / "docs/deploy.md"
 
 
 @pytest.mark.parametrize(
@@ -70,6 +80,9 @@ def test_an_overlay_renders_to_what_kubernetes_expects(folder: Path):
             assert one["metadata"]["namespace"] == "riposte", one["metadata"]["name"]
         if one["kind"] in ("StatefulSet", "Deployment"):
             spec = one["spec"]["template"]["spec"]
+            for container in spec["containers"]:
+                tag = container["image"].rpartition("/")[2].partition(":")[2]
+                assert tag not in ("", "latest"), container["image"]
             for volume in spec["volumes"]:
                 if (config := volume.get("configMap")) is not None:
                     assert ("ConfigMap", config["name"]) in names, config["name"]
@@ -77,6 +90,22 @@ def test_an_overlay_renders_to_what_kubernetes_expects(folder: Path):
     for scaler in scalers:
         target = scaler["spec"]["scaleTargetRef"]
         assert (target["kind"], target["name"]) in names
+
+
+def test_no_image_is_whatever_was_pushed_last():
+    """An image without a tag is ``latest``, and Kubernetes asks a registry for it every time."""
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    for folder in OVERLAYS:
+        (made,) = documents(folder / "kustomization.yaml")
+        tags = {image["name"]: image["newTag"] for image in made["images"]}
+        for name, _, spec in pods():
+            for container in spec["containers"]:
+                image, _, tag = container["image"].partition(":")
+                tag = tags.get(image, tag)
+                assert tag not in ("", "latest"), f"{folder.name}: {name}: {container['image']}"
+                assert image not in OWN_IMAGES or tag == version, f"{folder.name}: {name}: {tag}"
+    built = re.findall(r"(?m)^docker build .*--target \w+ -t (\S+)", code_blocks(DEPLOY_PAGE))
+    assert built == [f"{name}:{version}" for name in OWN_IMAGES]
 
 
 def test_selectors_select_somebody():
