@@ -16,6 +16,8 @@ from shared.runtime.service import Health, StatusReporter
 TURN_SECONDS = 0.25
 LOOK_SECONDS = 1.0
 """Period of looking at what was refused; each session is in at most one line of each."""
+REFUSED = ("refused_messages", "refused_connections", "refused_strangers")
+"""Counters; an alert is raised when one grows (deploy/prometheus)."""
 LOOKS_PER_COUNT = 10
 """After so many looks the connected processes are counted in the log."""
 
@@ -62,9 +64,7 @@ class Watch:
         self._library = library
         self._counted: Counter[str] = Counter({"": -1})
         self._looks = 0
-        self._refused: Counter[str] = Counter(
-            refused_messages=0, refused_connections=0, refused_strangers=0
-        )
+        self._refused: Counter[str] = Counter(dict.fromkeys(REFUSED, 0))
 
     def look(self) -> None:
         """Log who came and went and who was refused, and now and then how many are there."""

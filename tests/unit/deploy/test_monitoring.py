@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from services.metrics.families import FAMILIES
+from services.router.service import REFUSED
 from shared.bus.counters import NAMES
 from tests.unit.deploy.found import DEPLOY, ROOT, documents, pods
 
@@ -69,6 +70,13 @@ def test_counters_and_rates_that_queries_choose_are_counted_somewhere():
         assert of_the_bus or re.search(rf'"{name}"|\b{name}=0', source), name
 
 
+def test_the_alert_of_refusals_goes_by_the_routers_counters_and_everybodys():
+    (alert,) = (rule for rule in rules() if rule.get("alert") == "RiposteMessagesRefused")
+    (chosen,) = re.findall(r'counter=~"([^"]*)"', alert["expr"])
+    assert set(chosen.split("|")) == {*REFUSED, "bus_refused_messages"}
+    assert "refused_messages" in NAMES
+
+
 def test_every_alert_says_what_it_is_and_the_runbook_what_to_do():
     runbook = (DEPLOY / "runbook.md").read_text()
     named = re.findall(r"(?m)^### (Riposte\w+)$", runbook)
@@ -94,6 +102,30 @@ def test_what_is_scraped_is_where_the_endpoint_listens():
     assert job["static_configs"] == [{"targets": ["metrics:9464"]}]
     ports = {name: spec["containers"][0].get("ports", []) for name, _, spec in pods()}
     assert ports["riposte-metrics"] == [{"name": "metrics", "containerPort": 9464}]
+
+
+def test_in_a_cluster_the_endpoint_is_found_by_what_the_manifests_call_it():
+    (compose,) = documents(DEPLOY / "prometheus/prometheus.yml")
+    (made,) = documents(DEPLOY / "prometheus/kubernetes.yml")
+    assert made["rule_files"] == compose["rule_files"]
+    (rules_file,) = made["rule_files"]
+    assert (DEPLOY / "prometheus" / rules_file.rpartition("/")[2]).is_file()
+    (job,) = made["scrape_configs"]
+    assert job["job_name"] == "riposte"  # the alerts ask for up{job="riposte"}
+    assert job["honor_labels"] is True
+    (found,) = job["kubernetes_sd_configs"]
+    (overlay,) = documents(DEPLOY / "kubernetes/overlays/small/kustomization.yaml")
+    assert found == {"role": "pod", "namespaces": {"names": [overlay["namespace"]]}}
+    (rule,) = job["relabel_configs"]
+    assert rule["action"] == "keep"
+    kept = [
+        name
+        for name, labels, spec in pods()
+        for container in spec["containers"]
+        for port in container.get("ports", [])
+        if f"{labels['app.kubernetes.io/name']};{port['name']}" == rule["regex"]
+    ]
+    assert kept == ["riposte-metrics"]
 
 
 def test_panels_do_not_overlap_and_have_names_of_their_own():
