@@ -5,6 +5,7 @@ import json
 import pytest
 import zenoh
 
+from shared.bus.refusals import LOG_FILTER
 from tests.unit.deploy.found import DEPLOY, pods
 
 CONFIG = DEPLOY / "zenoh/zenohd.json5"
@@ -39,4 +40,22 @@ def test_it_finds_its_certificate_and_its_port_where_the_pod_has_them(config: ze
     assert tls["listen_private_key"] == f"{mounts['certificates']}/router.key"
     (port,) = (port["containerPort"] for port in router["ports"])
     assert json.loads(config.get_json("listen/endpoints")) == [f"tls/0.0.0.0:{port}"]
-    assert router["args"] == ["--config", f"{mounts['config']}/{CONFIG.name}"]
+    assert router["args"][:2] == ["--config", f"{mounts['config']}/{CONFIG.name}"]
+
+
+def test_what_zenohd_switches_on_by_itself_is_switched_off_again(config: zenoh.Config):
+    """Its ``main.rs`` enables both after it has read its file, and takes ``--cfg`` last."""
+    (router,) = (spec["containers"][0] for name, _, spec in pods() if name == "riposte-router")
+    _, _, *last = router["args"]
+    assert last == ["--cfg=adminspace/enabled:false", "--cfg=plugins_loading/enabled:false"]
+    for word in last:
+        key, _, value = word.removeprefix("--cfg=").partition(":")
+        config.insert_json5(key, "true")
+        config.insert_json5(key, value)
+        assert json.loads(config.get_json(key)) is False
+
+
+def test_zenohd_logs_what_it_refuses_as_our_router_does():
+    (router,) = (spec["containers"][0] for name, _, spec in pods() if name == "riposte-router")
+    environment = {variable["name"]: variable["value"] for variable in router["env"]}
+    assert environment["RUST_LOG"] == LOG_FILTER
