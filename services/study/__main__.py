@@ -14,7 +14,7 @@ from services.study.course import Terms
 from services.study.lsl import LslOutlet
 from services.study.opening import plan_of
 from services.study.service import Study, asks_of
-from services.study.web import Web, token_of
+from services.study.web import Web, drop_token, token_of
 from shared.bus.base import Bus
 from shared.clock import Clock
 from shared.errors import ConfigError
@@ -89,6 +89,8 @@ def run(service: Study, bus: Bus, clock: Clock, args: ServeArgs, stop: threading
             reporter.tick()
     finally:
         (args.run / FILE).unlink(missing_ok=True)
+        if service.session.is_over:
+            drop_token(service.folder)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

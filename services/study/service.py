@@ -97,6 +97,8 @@ class Study:
             StudyError: the journal is none of this plan's.
             RiposteError: a file cannot be written.
         """
+        self.folder = folder
+        """Of the session."""
         self._plan = plan
         self._journal = journal
         self._asks = asks

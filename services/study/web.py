@@ -71,6 +71,11 @@ def token_of(folder: Path) -> str:
     return token
 
 
+def drop_token(folder: Path) -> None:
+    """Delete the researcher's token of a folder: the address that it was in opens nothing more."""
+    (folder / TOKEN_FILE).unlink(missing_ok=True)
+
+
 def load_assets(folder: Path = STATIC) -> dict[str, Asset]:
     """Return the files of both pages by path.
 
