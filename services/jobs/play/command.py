@@ -38,6 +38,8 @@ from shared.runtime.serve import EXIT_BAD_INPUT, stop_on_signals
 
 FREE_BYTES = 256 << 20
 """A match needs this much disk to begin with."""
+LAST_WORDS_BYTES = 1 << 20
+"""With less free disk, a process that ended without a word had no room for one."""
 TICK_SECONDS = 0.03
 SHUT_SECONDS = 1.0
 """Longest wait for the gate to shut at the end; the robot is held by robot_io's own end, too."""
@@ -246,6 +248,8 @@ class Course:
                 exit_code=event.exit_code,
             )  # fmt: skip
             if event.kind == "gave_up":
+                if not event.tail.strip():  # perhaps because the disk had no room for its words
+                    require_free_space(self._plan.folder, LAST_WORDS_BYTES)
                 is_told = event.exit_code == EXIT_BAD_INPUT  # in one line, which is its last
                 raise RiposteError(event.describe if is_told else f"{event.describe}\n{event.tail}")
             screen.say(event.describe)

@@ -1,21 +1,31 @@
 """A disk that fills up while a session goes on: a clear error, and nothing of before is lost."""
 
 import itertools
+import sys
+import threading
+import time
+from types import SimpleNamespace
 
 import pytest
+from rich.console import Console
 
-from shared.clock import ManualClock
+from services.jobs.play.command import Course
+from services.jobs.play.plan import parse, plan_of
+from services.supervisor import ProcessSpec, Supervisor
+from shared.clock import ManualClock, SystemClock
 from shared.errors import RiposteError
 from shared.runtime.files import atomic_write
 from shared.study.checking import study_remarks
 from shared.study.events import Noted, SessionBegan
 from shared.study.folder import open_study
 from shared.study.journal import Journal, read_journal
+from shared.study.progress import replay
 from shared.study.recorded import refresh, write_session
 from shared.study.rows import HeartRateRow
 from shared.study.tsv import RowLog, read_table
 from shared.study.withdrawal import withdraw
 from tests.integration.disks import fill, small_disk
+from tests.integration.study.running import People, events_of, make, running
 from tests.unit.study.made import AT, play, study_in
 
 CLOCK = ManualClock(AT + 10_000.0)
@@ -100,3 +110,69 @@ def test_a_disk_that_will_not_hold_the_study_is_noticed_before_it_begins(tmp_pat
         notes = [remark.text for remark in study_remarks(study) if remark.level == "note"]
         # 4 people, 9 games of 20 s each, 0.25 MB/s.
         assert [note for note in notes if note.startswith("4 people who have not played need")]
+
+
+@pytest.mark.zenoh
+@pytest.mark.slow
+@pytest.mark.timeout(400)
+def test_a_run_whose_disk_fills_up_ends_with_one_line_and_goes_on_when_there_is_room(tmp_path):
+    with small_disk(tmp_path, 300) as disk:
+        (disk / "study").mkdir()
+        (tmp_path / "study").symlink_to(disk / "study")  # what the command says is elsewhere
+        study = make(tmp_path / "study")
+        people = People(study.session_folder("sub-01"))
+        with running(study, "sub-01") as run:
+            people.until(lambda: "baseline-walking" in progress_of(study).done, run, 150.0)
+            fill(disk / "ballast")
+            before = events_of(study)
+            deadline = time.monotonic() + 60.0
+            while run.process.poll() is None:  # what fits beside the last line is still written
+                people.tick()
+                assert time.monotonic() < deadline, run.said
+                time.sleep(0.02)
+            code, said = run.finish()
+        assert code == 2, said
+        last = said.splitlines()[-1]
+        assert last.startswith("riposte: study: ")
+        assert "no space left" in last, said
+        assert "Traceback" not in said
+        kept = events_of(study)
+        assert kept[: len(before)] == before
+        (disk / "ballast").unlink()
+        with running(study, "sub-01") as run:
+            people.until(lambda: progress_of(study).state == "ended", run, 120.0)
+            code, said = run.finish()
+        people.close()
+        assert code == 0, said
+        events = events_of(study)
+        assert events[: len(kept)] == kept
+        assert [event.number for event in events] == list(range(1, len(events) + 1))
+
+
+def test_a_process_whose_last_words_found_no_room_is_said_to_have_had_none(tmp_path):
+    with small_disk(tmp_path, 1) as disk:
+        words = ["--antagonist", "scripted:stab", "--protagonist", "scripted:guard"]
+        plan = plan_of(parse([*words, "--out", str(disk / "run")]))
+        course = Course(plan, Console(), threading.Event(), browser=False)
+        silent = ProcessSpec("study-0", (sys.executable, "-c", "raise SystemExit(2)"))
+        supervisor = Supervisor([silent], disk / "run" / "logs", SystemClock())
+        supervisor.start()
+        fill(disk / "ballast")
+        said = []
+        try:
+            with pytest.raises(RiposteError, match=r"no space left: .*run has 0 MiB free"):
+                watch(course, supervisor, SimpleNamespace(say=said.append))
+        finally:
+            supervisor.stop()
+    assert said == ["study-0 died (exit code 2)"]
+
+
+def watch(course, supervisor, screen, seconds=30.0):
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        course._watch(supervisor, None, screen)
+        time.sleep(0.02)
+
+
+def progress_of(study):
+    return replay(events_of(study))
