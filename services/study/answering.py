@@ -87,8 +87,6 @@ class Answering:
         """Return what a researcher may ask for now."""
         session = self._session
         state = session.progress.state
-        if state == "withdrawn":
-            return ()
         if state in ("ended", "aborted"):
             return ("note", "disarm", "void")
         if state == "new":

@@ -94,7 +94,7 @@ class Session:
         self._journal = journal
         self._clock = clock
         self.progress = replay(journal.events)
-        if journal.events and self.progress.state not in ("ended", "withdrawn"):
+        if journal.events and self.progress.state != "ended":
             self._resume()
 
     @property
@@ -107,7 +107,7 @@ class Session:
     @property
     def is_over(self) -> bool:
         """Return whether nothing is left to do."""
-        return self.progress.state in ("ended", "aborted", "withdrawn")
+        return self.progress.state in ("ended", "aborted")
 
     @property
     def is_bout_on(self) -> bool:

@@ -36,7 +36,7 @@ def course_of(session: Session) -> Course:
         return "new"
     if state == "aborted":
         return "aborted"
-    if state in ("ended", "withdrawn"):
+    if state == "ended":
         return "ended"
     return "paused" if session.progress.is_paused else "running"
 

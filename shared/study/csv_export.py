@@ -10,12 +10,9 @@ import msgspec
 
 from shared.errors import StudyError
 from shared.runtime.files import atomic_write
-from shared.study.events import Noted
 from shared.study.folder import PARTICIPANTS, Study
-from shared.study.instants import text_of
-from shared.study.journal import read_journal
-from shared.study.recorded import EVENTS, GAMES, HEART_RATE, QUESTIONNAIRE, RANKINGS
-from shared.study.rows import SCHEMA, ParticipantRow
+from shared.study.recorded import EVENTS, GAMES, HEART_RATE, QUESTIONNAIRE, RANKINGS, rows_of
+from shared.study.rows import NoteRow, ParticipantRow
 from shared.study.tables import SESSION_TABLES, named, session_rows
 from shared.study.tsv import columns_of, read_table
 
@@ -25,19 +22,6 @@ FILES: Final = {
 }  # fmt: skip
 TELLING: Final = ("policy",)
 """Columns that tell a condition; empty in a blinded export."""
-
-
-class NoteRow(msgspec.Struct, frozen=True, kw_only=True):
-    """What the researcher wrote down in a session (``notes.csv``)."""
-
-    participant: str
-    session: int
-    number: int
-    t_ns: int
-    wall: str
-    step: str
-    text: str
-    schema: int = SCHEMA
 
 
 def export(study: Study, out: Path, unblind: bool = False) -> dict[str, int]:
@@ -69,15 +53,8 @@ def export(study: Study, out: Path, unblind: bool = False) -> dict[str, int]:
 
 
 def _notes(study: Study) -> list[NoteRow]:
-    return [
-        NoteRow(
-            participant=participant, session=number, number=event.number, t_ns=event.t_ns,
-            wall=text_of(event.wall_ns), step=event.step, text=event.what.text,
-        )
-        for participant, number, folder in study.sessions()
-        for event in read_journal(folder)
-        if isinstance(event.what, Noted)
-    ]  # fmt: skip
+    found = [rows_of(study, participant, number) for participant, number, _ in study.sessions()]
+    return [note for rows in found if rows is not None for note in rows.notes()]
 
 
 def _check_empty(out: Path) -> None:

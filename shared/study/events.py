@@ -172,14 +172,10 @@ class SessionEnded(msgspec.Struct, frozen=True, kw_only=True, tag="session_ended
     """The last step is done."""
 
 
-class Withdrawn(msgspec.Struct, frozen=True, kw_only=True, tag="withdrawn"):
-    """The participant wants everything deleted; `riposte study withdraw` does it."""
-
-
 What = (
     SessionBegan | SessionResumed | StepBegan | StepDone | Consented | Measured | GameStarted
     | GameEnded | Answered | Ranked | Noted | Voided | Repeated | Paused | Unpaused | Aborted
-    | SessionEnded | Withdrawn
+    | SessionEnded
 )  # fmt: skip
 
 

@@ -26,11 +26,10 @@ from shared.study.events import (
     StepDone,
     Unpaused,
     Voided,
-    Withdrawn,
 )
 from shared.study.steps import GAME_KINDS, Step
 
-State = Literal["new", "going", "ended", "aborted", "withdrawn"]
+State = Literal["new", "going", "ended", "aborted"]
 
 
 class Attempt(msgspec.Struct, frozen=True, kw_only=True):
@@ -123,8 +122,8 @@ def follow(progress: Progress, event: Event) -> None:
         StudyError: the event cannot follow those before it.
     """
     what, step = event.what, event.step
-    if progress.state in ("ended", "aborted", "withdrawn") and not isinstance(
-        what, SessionResumed | Noted | Voided | Withdrawn
+    if progress.state in ("ended", "aborted") and not isinstance(
+        what, SessionResumed | Noted | Voided
     ):
         raise _impossible(event, f"the session is over ({progress.state})")
     match what:
@@ -155,8 +154,6 @@ def follow(progress: Progress, event: Event) -> None:
             progress.state = "aborted"
         case SessionEnded():
             progress.state = "ended"
-        case Withdrawn():
-            progress.state = "withdrawn"
     progress.last = event
 
 

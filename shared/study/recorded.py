@@ -10,6 +10,7 @@ from shared.study.events import (
     Event,
     GameEnded,
     GameStarted,
+    Noted,
     Ranked,
     Repeated,
     SessionBegan,
@@ -23,6 +24,7 @@ from shared.study.protocol import Item, Protocol
 from shared.study.rows import (
     EventRow,
     GameRow,
+    NoteRow,
     ParticipantRow,
     QuestionnaireRow,
     RankingRow,
@@ -144,6 +146,19 @@ class SessionRows:
     def events(self) -> list[EventRow]:
         """Return a row for every event."""
         return [self._event(event) for event in self._events]
+
+    def notes(self) -> list[NoteRow]:
+        """Return the rows of all notes."""
+        rows = zip(self._events, self.events(), strict=True)
+        return [
+            NoteRow(
+                participant=row.participant, session=row.session, number=row.number, t_ns=row.t_ns,
+                wall=row.wall, step=row.step, section=row.section, condition=row.condition,
+                game=row.game, text=event.what.text, policy=row.policy, config=row.config,
+                commit=row.commit,
+            )
+            for event, row in rows if isinstance(event.what, Noted)
+        ]  # fmt: skip
 
     def _game(self, attempt: Attempt, step: Step) -> GameRow:
         start, end, event = attempt.start, attempt.end, attempt.started

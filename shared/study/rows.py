@@ -23,7 +23,7 @@ class ParticipantRow(msgspec.Struct, frozen=True, kw_only=True):
     order: str
     """Labels of the conditions in the order of the sections: ``B,A``."""
     state: str
-    """``going``, ``ended``, ``aborted`` or ``withdrawn``."""
+    """``going``, ``ended`` or ``aborted``."""
     games: int
     """Games that count."""
     t_ns: int
@@ -167,6 +167,26 @@ class EventRow(msgspec.Struct, frozen=True, kw_only=True):
     game: int
     attempt: int
     reason: str
+    policy: str
+    config: str
+    schema: int = SCHEMA
+    commit: str = ""
+
+
+class NoteRow(msgspec.Struct, frozen=True, kw_only=True):
+    """What the researcher wrote down in a session (``notes.csv``)."""
+
+    participant: str
+    session: int
+    number: int
+    """Of the event."""
+    t_ns: int
+    wall: str
+    step: str
+    section: int
+    condition: str
+    game: int
+    text: str
     policy: str
     config: str
     schema: int = SCHEMA

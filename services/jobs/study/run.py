@@ -123,10 +123,9 @@ def progress_of(
     folder = study.session_folder(participant)
     events = read_journal(folder)
     progress = replay(events)
-    if progress.state in ("ended", "withdrawn"):
-        what = "has played" if progress.state == "ended" else "has withdrawn"
+    if progress.state == "ended":
         raise StudyError(
-            f"{participant} {what} already ({folder}): everybody plays once; name the next "
+            f"{participant} has played already ({folder}): everybody plays once; name the next "
             "participant of the allocation"
         )
     last = events[-1].wall_ns if events else 0

@@ -6,10 +6,12 @@ import io
 import shutil
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from services.cli import main
 from services.jobs.study.command import SUBCOMMANDS
+from shared.study.events import Event, Noted
 from shared.study.folder import open_study
 from shared.study.protocol_file import shipped_protocol
 from tests.unit.study.made import play, study_in
@@ -105,6 +107,27 @@ def test_an_export_is_blinded_unless_asked_otherwise(played, tmp_path, capsys):
     assert games[1]["policy"].startswith("sha256:")
     words = {row["text"] for row in table(tmp_path / "open" / "questionnaire.csv")}
     assert {"my\town\nwords", 'said "n/a"; then\t\\n'} <= words
+
+
+def test_a_note_is_exported_with_its_place_in_the_session(played, tmp_path, capsys):
+    folder = tmp_path / "noted"
+    shutil.copytree(played.folder, folder)
+    journal = folder / "sub-01" / "ses-01" / "journal.jsonl"
+    lines = journal.read_bytes().splitlines()
+    last = msgspec.json.decode(lines[-1], type=Event)
+    note = msgspec.structs.replace(
+        last, number=last.number + 1, step="s2-g03", what=Noted(text="the, phone")
+    )
+    journal.write_bytes(b"\n".join([*lines, msgspec.json.encode(note), b""]))
+    run(capsys, "export", folder, "--out", tmp_path / "out")
+    (row,) = table(tmp_path / "out" / "notes.csv")
+    assert (row["section"], row["game"], row["text"]) == ("2", "3", "the, phone")
+    assert row["condition"] == played.labels_of("sub-01")[1]
+    assert (row["config"], row["commit"], row["policy"]) == ("c" * 64, "abc", "")
+    run(capsys, "export", folder, "--out", tmp_path / "open", "--unblind")
+    (row,) = table(tmp_path / "open" / "notes.csv")
+    assert row["condition"] == played.order_of("sub-01")[1]
+    assert row["policy"].startswith("sha256:")
 
 
 @pytest.fixture
