@@ -56,14 +56,14 @@ def test_a_session_is_run_stopped_and_gone_on_with_to_its_end(tmp_path: Path):
         wait_for_heart(people, run)  # the sensor is on before anybody has agreed to it
         people.until(lambda: "s1-g01" in replay(events_of(study)).done, run)
         run.process.send_signal(signal.SIGINT)
-        code, said = run.finish()
+        code, said = run.finish(120.0)
     assert code == 130, said
     assert "say the same command again" in said
     assert "researcher: http" in said
     assert "token=" in said
     with running(study, "sub-01", has_recording=True) as run:
         people.until(lambda: replay(events_of(study)).state == "ended", run)
-        code, said = run.finish()
+        code, said = run.finish(120.0)
     people.close()
     assert code == 0, said
     assert "sub-01 goes on where it was" in said
