@@ -40,6 +40,14 @@ def test_how_difficult_the_opponents_are_is_no_part_of_it(levels):
     assert not found.is_significant
 
 
+def test_the_section_that_everybody_begins_with_is_no_part_of_it():
+    games = made(["abc", "acb"] * 6, (0.0, 100.0, 300.0), first=1, games=5)
+    cube = games.by_section.copy()
+    cube[:, 0] += 1000.0 * np.arange(5.0)
+    steep = dataclasses.replace(games, by_section=cube)
+    assert switch_effect(steep) == switch_effect(games)
+
+
 def test_a_drop_is_found_in_its_size():
     found = switch_effect(made(["abc", "bca", "cab", "acb", "bac", "cba"] * 3, (0.0, 400.0, -90.0),
                                drop=200.0))  # fmt: skip
