@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from rerun.chunk import RrdReader
 
+from services.study.web import TOKEN_FILE
 from shared.game.recount import recount
 from shared.game.rules import RuleBook
 from shared.sim.arena import bat_of, target_of
@@ -60,13 +61,17 @@ def test_a_session_is_run_stopped_and_gone_on_with_to_its_end(tmp_path: Path):
     assert code == 130, said
     assert "say the same command again" in said
     assert "researcher: http" in said
-    assert "token=" in said
+    token = (folder / TOKEN_FILE).read_bytes()
+    assert f"token={token.decode()}" in said
     with running(study, "sub-01", has_recording=True) as run:
         people.until(lambda: replay(events_of(study)).state == "ended", run)
         code, said = run.finish(120.0)
     people.close()
     assert code == 0, said
     assert "sub-01 goes on where it was" in said
+    kept = [path for path in study.folder.rglob("*") if path.is_file()]
+    assert {"journal.jsonl", "run.jsonl"} <= {path.name for path in kept}
+    assert [path for path in kept if token in path.read_bytes()] == []
 
     games = read_table(folder / GAMES, GameRow)
     finished = [row for row in games if row.outcome == "finished"]
