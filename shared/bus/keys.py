@@ -59,13 +59,18 @@ def fields_in(template: str, key: str) -> dict[str, str]:
     }
 
 
+def is_chunk(text: str) -> bool:
+    """Return whether a text can be one chunk of a key of ours."""
+    return _CHUNK.fullmatch(text) is not None
+
+
 def check_chunk(what: str, value: str) -> None:
     """Refuse a text that cannot be one chunk of a key.
 
     Raises:
         ValueError: naming the value.
     """
-    if not _CHUNK.fullmatch(value):
+    if not is_chunk(value):
         raise ValueError(f"{what} {value!r} must be 1 to 255 letters, digits, '.', '_' or '-'")
 
 

@@ -31,7 +31,7 @@ from shared.bus.base import NoAnswer, Refused
 from shared.bus.config import BusConfig, client_json, warn_of_plain_network
 from shared.bus.counters import Counters
 from shared.bus.endpoints import Answer, Host, Present, Requests, Values, ask_of, too_long
-from shared.bus.keys import PREFIX, check_chunk, key_of, pattern_of
+from shared.bus.keys import PREFIX, check_chunk, is_chunk, key_of, pattern_of
 from shared.bus.latest import LatestSent, stamp_of
 from shared.bus.tls import check_files, files_of, why_refused
 from shared.bus.watchdog import Watchdog
@@ -358,8 +358,9 @@ def _note_token(present: Present, token: zenoh.Sample) -> None:
 
 
 def _note_run(names: set[str], key: str) -> None:
-    if len(names) < MOST_RUNS:
-        names.add(key.removeprefix(f"{PREFIX}/").partition("/")[0])
+    name = key.removeprefix(f"{PREFIX}/").partition("/")[0]
+    if len(names) < MOST_RUNS and is_chunk(name):  # another is none of ours, and people see these
+        names.add(name)
 
 
 def open_session(config: str) -> zenoh.Session:

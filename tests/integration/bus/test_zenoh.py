@@ -174,6 +174,25 @@ def test_runs_do_not_see_each_other(shared_router: Any, zenoh_world: Any) -> Non
         assert zenoh_world.until(pending.take) == NoAnswer("nobody answers league/lease")
 
 
+def test_a_run_whose_name_is_none_is_not_named_to_people(zenoh_world: Any) -> None:
+    bus = zenoh_world.join("operator")
+    over = threading.Event()
+    with zenoh.open(zenoh.Config.from_json5(client_json(zenoh_world.cfg, "operator"))) as stranger:
+
+        def shout() -> None:
+            while not over.wait(0.02):
+                for run in ("\x1b]0;owned", "a;b", "two words", "fine-1"):
+                    stranger.put(f"riposte/v1/{run}/league/schedule", b"x")
+
+        thread = threading.Thread(target=shout)
+        thread.start()
+        try:
+            assert bus.runs(SCHEDULE, 0.5) == {"fine-1"}
+        finally:
+            over.set()
+            thread.join()
+
+
 def test_junk_from_a_stranger_is_refused_and_counted(zenoh_world: Any) -> None:
     world = zenoh_world
     bus = world.join("league")
