@@ -36,7 +36,7 @@ def test_a_change_that_every_seed_shows_is_found():
     assert (
         lines[-1]
         == "| score, at the end | 1,001 [999, 1,003] | 1,201 [1,199, 1,203] | 200 [200, 200] |"
-    )  # noqa: E501
+    )
 
 
 def test_other_seeds_and_files_without_runs_are_refused(tmp_path: Path):
