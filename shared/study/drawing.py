@@ -61,13 +61,18 @@ def _extended(
     """Return the rows that are there and those that come after all that were ever drawn.
 
     Raises:
-        StudyError: what is there was not drawn from this protocol and seed.
+        StudyError: there is no key, or what is there was not drawn from this protocol and seed.
     """
     key = read_key(folder)
-    meant = {label: entry.condition for label, entry in key.label.items()} if key else {}
+    if key is None:
+        raise StudyError(
+            f"{folder} has no {KEY}, and {ALLOCATION} holds orders: put the key back; to begin "
+            f"anew, as long as nobody has played, delete {ALLOCATION}"
+        )
+    meant = {label: entry.condition for label, entry in key.label.items()}
     by_name = {row.participant: row for row in rows}
     is_other = any(by_name.get(row.participant, row) != row for row in there)
-    if key is None or key.seed != seed or meant != made.labels or is_other:
+    if key.seed != seed or meant != made.labels or is_other:
         raise StudyError(
             f"{folder / ALLOCATION} holds other orders: draw more people with the seed it was "
             f"drawn with (in {KEY}); to begin anew, as long as nobody has played, delete "

@@ -157,8 +157,13 @@ def test_without_the_key_a_study_is_checked_and_exported_as_with_it(
 
 def test_without_the_key_a_study_is_analysed_and_what_needs_it_says_so(keyless, capsys):
     assert "files in" in run(capsys, "analyse", keyless)
-    for words in (["analyse", keyless], ["export", keyless, "--out", keyless.parent / "open"]):
-        assert "put the key back" in run(capsys, *words, "--unblind", code=2)
+    for words in (
+        ["analyse", keyless, "--unblind"],
+        ["export", keyless, "--out", keyless.parent / "open", "--unblind"],
+        ["allocate", keyless, "--people", "8", "--seed", "7"],
+        ["run", keyless, "--participant", "sub-02"],
+    ):
+        assert "put the key back" in run(capsys, *words, code=2)
 
 
 def test_an_export_into_a_folder_that_holds_something_is_refused(played, tmp_path, capsys):
