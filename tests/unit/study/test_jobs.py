@@ -155,8 +155,12 @@ def test_without_the_key_a_study_is_checked_and_exported_as_with_it(
         assert (keyless / path.relative_to(played.folder)).read_bytes() == path.read_bytes()
 
 
-def test_without_the_key_a_study_is_analysed_and_what_needs_it_says_so(keyless, capsys):
+@pytest.mark.slow
+def test_without_the_key_a_study_is_analysed(keyless, capsys):
     assert "files in" in run(capsys, "analyse", keyless)
+
+
+def test_what_needs_the_key_says_to_put_it_back(keyless, capsys):
     for words in (
         ["analyse", keyless, "--unblind"],
         ["export", keyless, "--out", keyless.parent / "open", "--unblind"],
