@@ -40,6 +40,7 @@ def test_a_killed_actor_is_seen_to_die_to_come_back_and_to_cost_nothing(tmp_path
 
 
 @pytest.mark.chaos
+@pytest.mark.timeout(900)  # a whole run, which goes to its end after the faults
 @pytest.mark.parametrize(
     "names",
     [
