@@ -59,6 +59,11 @@ class Counted:
         """Return what was asked."""
         return self._inner.message
 
+    @property
+    def dropped(self) -> int:
+        """Return how many values a subscription threw away."""
+        return self._inner.dropped
+
     def take(self) -> Any:
         """Return what the inner one has; a request is timed, too."""
         found = self._meter.timed(self._inner.take)()
