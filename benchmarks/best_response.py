@@ -88,7 +88,7 @@ def learn(
         if update == shaped and update > 0:
             other = seed + 2 * _OTHER_STREAM
             collector = _collector(settings, env, opponent, other, is_shaped=False)
-        rate = _learning_rate(settings, update / updates)
+        rate = learner.learning_rate_at(update / updates)  # as over a stage of a run
         optimiser.update(gather(learner.batch_samples), rate)
     trained_at = time.perf_counter()
     played = evaluate(settings, GaussianPolicy(optimiser.weights()), opponent, seed)
@@ -137,12 +137,6 @@ def _collector(
     return Collector(
         env, 0, opponent.make(), settings.actor.rollout_steps, *weights, settings.reward, seed
     )
-
-
-def _learning_rate(settings: Settings, share: float) -> float:
-    """Return Adam's step, a line down over the budget as over a stage of a run."""
-    first, last = settings.learner.learning_rate, settings.learner.final_learning_rate
-    return first + share * (last - first)
 
 
 def _env(settings: Settings, num_envs: int) -> FencingEnv:

@@ -89,5 +89,9 @@ class LearnerConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         """
         if stage is not None and stage.phase == "two":
             return self.phase_two_learning_rate
-        share = 0.0 if stage is None else min(updates / stage.max_updates, 1.0)
+        return self.learning_rate_at(0.0 if stage is None else updates / stage.max_updates)
+
+    def learning_rate_at(self, share: float) -> float:
+        """Return Adam's step at a share of a stage's budget; beyond its end it stays."""
+        share = min(share, 1.0)
         return self.learning_rate + share * (self.final_learning_rate - self.learning_rate)

@@ -11,7 +11,7 @@ from rsl_rl.runners import OnPolicyRunner
 from rsl_rl.storage import RolloutStorage
 from tensordict import TensorDict
 
-from services.learner.config import LearnerConfig
+from benchmarks.peer_loops.rsl_rl_runner import runner_config
 from services.learner.ppo import PolicyOptimiser
 from shared.errors import CheckpointError, ConfigError
 from shared.messages.training import ACTION_DIM, OBS_DIM, Rollout
@@ -45,45 +45,6 @@ class Recorded(VecEnv):
         self.actions.append(actions.clone())
         reward = self.rewards[len(self.actions) - 1]
         return self.get_observations(), reward, torch.zeros(self.num_envs), {}
-
-
-def runner_settings(cfg: LearnerConfig, steps: int) -> dict[str, Any]:
-    """The settings with which rsl_rl's own runner does what our learner is set to do."""
-    network = {
-        "class_name": "MLPModel",
-        "hidden_dims": list(cfg.hidden_dims),
-        "activation": cfg.activation,
-        "obs_normalization": True,
-    }
-    return {
-        "num_steps_per_env": steps,
-        "save_interval": 10**6,
-        "obs_groups": {"actor": ["policy"], "critic": ["policy"]},
-        "actor": network
-        | {
-            "distribution_cfg": {
-                "class_name": "GaussianDistribution",
-                "init_std": cfg.initial_std,
-                "std_type": "log",
-                "std_range": (cfg.minimum_std, cfg.maximum_std),
-            }
-        },
-        "critic": network,
-        "algorithm": {
-            "class_name": "PPO",
-            "num_learning_epochs": cfg.epochs,
-            "num_mini_batches": cfg.minibatches,
-            "clip_param": cfg.clip,
-            "gamma": cfg.gamma,
-            "lam": cfg.gae_lambda,
-            "value_loss_coef": cfg.value_loss_coef,
-            "entropy_coef": cfg.entropy_coef,
-            "learning_rate": cfg.learning_rate,
-            "max_grad_norm": cfg.max_grad_norm,
-            "use_clipped_value_loss": False,
-            "schedule": "fixed",
-        },
-    }
 
 
 def as_rollout(obs: torch.Tensor, rewards: torch.Tensor, storage: RolloutStorage) -> Rollout:
@@ -122,7 +83,7 @@ def test_three_updates_of_rsl_rls_own_runner_give_the_same_weights_and_moments(
         obs = torch.randn(steps + 1, worlds, OBS_DIM, generator=generator) * 1.5 + 0.3
         rewards = torch.randn(steps, worlds, generator=generator)
         runner = OnPolicyRunner(
-            Recorded(obs, rewards), runner_settings(cfg, steps), log_dir=None, device="cpu"
+            Recorded(obs, rewards), runner_config(cfg, steps), log_dir=None, device="cpu"
         )
         storage = runner.alg.storage
         # The runner's algorithm continues from ours; its own update draws from the same state.
