@@ -2,6 +2,7 @@
 
 import dataclasses
 import os
+import re
 import stat
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from shared.policy.scripted.sight import Arena
 from shared.policy.snapshot import MAX_BYTES, Fit, Snapshot, digest_of, unpack
 
 _DIGEST_PREFIX = "sha256:"
+_HASH = re.compile("[0-9a-f]{64}")
+"""Name of a file that says what its bytes must be."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,7 +51,10 @@ class Loader:
         """
         if text.startswith(SCRIPTED_PREFIX):
             return NamedPlayer(text, scripted_player(text, self.arena))
-        snapshot = self._find(text)
+        return self._fitting(self._find(text))
+
+    def _fitting(self, snapshot: Snapshot) -> NamedPlayer:
+        """Return a snapshot's player, if this side may be played by it."""
         if snapshot.card.agent != self.agent:
             raise SnapshotError(
                 f"snapshot {snapshot.digest[:12]} does not fit here: its agent is "
@@ -71,18 +77,17 @@ class Loader:
         Raises:
             SnapshotError: it is none of these, it is damaged, or it does not fit.
         """
-        found = text
+        if text.startswith(SCRIPTED_PREFIX) or (text and text in self.listed):
+            return self.load(text)
         if text.startswith(_DIGEST_PREFIX):
-            found = self._known_file(f"{digest_of(text)}.safetensors")
-        elif not text.startswith(SCRIPTED_PREFIX) and text not in self.listed:
-            found = ""
-        if not found:
-            raise SnapshotError(
-                f"there is no player {text[:80]!r} to be had over the bus: ask for scripted:NAME, "
-                "sha256:HASH of a snapshot in this run's folder, or one that [policy], "
-                "[page] players or [study] players of this process's settings names"
-            )
-        return self.load(found)
+            digest = digest_of(text)
+            if found := self._known_file(f"{digest}.safetensors"):
+                return self._fitting(unpack(_read(Path(found)), digest))
+        raise SnapshotError(
+            f"there is no player {text[:80]!r} to be had over the bus: ask for scripted:NAME, "
+            "sha256:HASH of a snapshot in this run's folder, or one that [policy], "
+            "[page] players or [study] players of this process's settings names"
+        )
 
     def _known_file(self, name: str) -> str:
         """Return the path of a snapshot file among those of this run and those listed, or ""."""
@@ -98,7 +103,8 @@ class Loader:
         for known in AGENTS:
             if run and agent == known:
                 return _newest(Path(run), known)
-        return unpack(_read(Path(text)))
+        path = Path(text)
+        return unpack(_read(path), path.stem if _HASH.fullmatch(path.stem) else None)
 
 
 def _newest(run: Path, agent: Agent) -> Snapshot:

@@ -213,6 +213,20 @@ def test_a_player_that_does_not_fit_changes_nothing(tmp_path: Path):
     assert stand.policy.health().last_error == reply.reason
 
 
+@pytest.mark.parametrize("is_listed", [False, True])
+def test_a_player_whose_bytes_have_changed_changes_nothing(tmp_path: Path, is_listed: bool):
+    made, other = MADE["protagonist"], snapshot(5, agent="protagonist")
+    store(tmp_path, made)
+    path = tmp_path / "snapshots" / f"{made.digest}.safetensors"
+    path.write_bytes(other.payload)  # sound in itself, and somebody else
+    stand = Stand(tmp_path, "scripted:static", listed=str(path) if is_listed else "")
+    for text in (made.reference, str(path)) if is_listed else (made.reference,):
+        reply = stand.ask(text)
+        assert not reply.accepted
+        assert f"its hash is {other.digest[:12]}, not {made.digest[:12]}" in reply.reason
+        assert reply.player == "scripted:static"
+
+
 def test_what_is_asked_for_cannot_be_told_from_what_is_not_there(tmp_path: Path):
     """Whoever is on the bus learns nothing of the files of the robot's machine."""
     store(tmp_path / "elsewhere", MADE["protagonist"])
