@@ -48,6 +48,9 @@ def test_a_killed_actor_is_seen_to_die_to_come_back_and_to_cost_nothing(tmp_path
         ("disk-full",),
         ("network-cut", "network-slow"),
         ("robot-kill-robot-io", "robot-kill-router", "robot-clock-jump"),
+        ("robot-corrupt-snapshot", "robot-lying-policy", "robot-unreliable-messages"),
+        ("robot-disk-full", "robot-kill-recorder"),
+        ("robot-network-cut",),
     ],
 )
 def test_faults_of_every_kind_of_run_cost_nothing(

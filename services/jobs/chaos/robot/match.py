@@ -1,4 +1,4 @@
-"""A match of two policies on the simulated robot, and faults that strike while it fences.
+"""A match of two policies on the simulated robot, watched while faults strike it.
 
 The watcher is the operator: after a trip it waits, sees that nothing moves, and arms again, as a
 person would. What it checks of the commands it reads from what robot_io says it sent, against the
@@ -6,29 +6,29 @@ numbers of ``[safety]``, with none of the gate's own code.
 """
 
 import contextlib
-import signal
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any, TypeVar
 
 import numpy as np
 
-from services.jobs.chaos.clock import step
-from services.jobs.chaos.faults import UP_SECONDS, Blow, Chance, Fault
-from services.jobs.chaos.job import FINISH_SECONDS, Job, JobEnded
-from services.jobs.chaos.rules import Rules
-from services.jobs.chaos.signals import kill, stop
+from services.jobs.chaos.faults import Blow
+from services.jobs.chaos.job import FINISH_SECONDS, POLL_SECONDS, Job, JobEnded
+from services.jobs.chaos.robot.rules import Bat, Rules
 from services.jobs.who import operator
 from services.robot_io.config import SafetyConfig
-from shared.bus.base import Bus, Pending
+from shared.bus.base import Bus, NoAnswer, Pending, Refused
 from shared.config.site import load_section
 from shared.errors import BusError, ConfigError
+from shared.messages.message import Message
 from shared.messages.play import BatStates, GateReply, GateRequest, GateState, RefereeState
-from shared.messages.topics import ARM, BATS, GATE, REFEREE
+from shared.messages.topics import ARM, BATS, GATE, REFEREE, Service
 from shared.runtime.serve import ServeArgs, open_site_bus
+from shared.sim.config import SimConfig
 
 SETTINGS = (
-    "play.record=false", "play.rest=0.0", "safety.ramp=0.5", "safety.command_hold=0.5",
+    "play.rest=0.0", "safety.ramp=0.5", "safety.command_hold=0.5",
     "safety.command_trip=1.0", "safety.tracker_hold=0.5", "safety.state_hold=0.5",
     "policy.stale_after=1.0", "policy.referee_silence=2.0", "robot_io.referee_silence=2.0",
     "referee.stale_after=1.0", "referee.void_after=10.0", "game.bout_steps=200",
@@ -36,7 +36,6 @@ SETTINGS = (
 """Patience for a machine that does more than this; and bouts so short that some come to an end
 between two faults, for a match gives up after twenty in a row that did not."""
 PLAYERS = ("--antagonist", "scripted:slash", "--protagonist", "heuristic")
-EVERYBODY = ("router-0", "robot-io-0", "policy-antagonist", "policy-protagonist", "referee-0")
 SHUT = ("disarmed", "tripped")
 STILL_SECONDS = 1.0
 """How long a robot that is shut is watched before it is armed."""
@@ -52,8 +51,10 @@ SEEN = 30
 WATCHER = ("bus.open_seconds=2.0", "bus.give_up_seconds=3600.0")
 """Settings of the watcher's own bus."""
 ANSWER_SECONDS = 3.0
-JUMP_SECONDS = 3.0
-"""How long a clock is wrong."""
+ANSWERS_SECONDS = 30.0
+"""Longest wait for what is asked again and again."""
+
+R = TypeVar("R", bound=Message)
 
 
 class Match(Job):
@@ -61,15 +62,23 @@ class Match(Job):
 
     verb = "play"
 
-    def __init__(self, *words: object, **more: object) -> None:
-        """Prepare as any job."""
-        super().__init__(*words, **more)  # type: ignore[arg-type]
-        self._overrides = SETTINGS
+    def __init__(self, *words: Any, is_recorded: bool = False, **more: Any) -> None:
+        """Prepare as any job.
+
+        Args:
+            words: of any job.
+            is_recorded: whether it has a recorder.
+            more: of any job.
+        """
+        super().__init__(*words, **more)
+        self._overrides = (*SETTINGS, f"play.record={str(is_recorded).lower()}")
+        self.broken: Counter[str] = Counter()
+        """Rules of the gate that were broken, by name."""
         self._bus: Bus | None = None
         self._states: deque[BatStates] = deque(maxlen=200)
         self._mode = ""
         self._phase = ""
-        self._rules = Rules(SafetyConfig())
+        self._rules = Rules(SafetyConfig(), Bat.of(SimConfig()))
         self._asked: Pending[GateReply] | None = None
         self._ask_at = 0.0
         self._is_arming = False
@@ -93,13 +102,20 @@ class Match(Job):
                     connect=(place.connect,), overrides=WATCHER,
                 )  # fmt: skip
                 self._bus = open_site_bus(args, self.clock)
-                cfg = load_section(self.folder / "config.toml", "safety", SafetyConfig, ())
-                self._rules = Rules(cfg)
+                site = self.folder / "config.toml"
+                self._rules = Rules(
+                    load_section(site, "safety", SafetyConfig, ()),
+                    Bat.of(load_section(site, "sim", SimConfig, ())),
+                )
                 self._bats = self._bus.subscribe(BATS)
                 self._gates = self._bus.subscribe(GATE)
                 self._referee = self._bus.subscribe(REFEREE)
             return
         self._bus.wait(0.0)
+        self._listen()
+
+    def _listen(self) -> None:
+        """Take what has arrived: states, gate, referee."""
         now = self.clock.now()
         while (states := self._bats.take()) is not None:
             self._states.append(states)
@@ -111,8 +127,20 @@ class Match(Job):
 
     def _hear(self, gate: GateState) -> None:
         self._mode = gate.mode
-        self.unsafe += self._rules.broken_by(gate)
+        if broken := self._rules.broken_by(gate):
+            self.unsafe += 1
+            self.broken[broken] += 1
         self.commands = self._rules.checked
+
+    def _rest(self) -> None:
+        """Wait as any job does, and meanwhile hear every tick: a gate says only its newest."""
+        if self._bus is None:
+            super()._rest()
+            return
+        until = self.clock.now() + POLL_SECONDS
+        while (left := until - self.clock.now()) > 0.0:
+            self._bus.wait(left)
+            self._listen()
 
     def _note(self, said: RefereeState) -> None:
         self._phase = said.phase
@@ -158,11 +186,39 @@ class Match(Job):
         elif self._asked is not None and (reply := self._asked.take()) is not None:
             self._asked = None
             self._ask_at = self.clock.now() + 0.3
-            if self._is_arming and isinstance(reply, GateReply) and not reply.accepted:
+            if self._is_arming and isinstance(reply, GateReply) and reply.mode in SHUT:
                 self._rules.note_arming(may_open=False)
+
+    def shut(self) -> None:
+        """Disarm the robot as a person does; the bout is lost by it."""
+        asked = GateRequest(action="disarm", operator=operator())
+        self.ask_until(ARM, asked, lambda _: self._mode in SHUT)
+
+    def ask_until(
+        self, service: Service[Any, R], asked: Message, is_done: Callable[[R], bool], **fields: str
+    ) -> R | None:
+        """Ask again and again until the answer will do; None where none does in time."""
+        pending: Pending[R] | None = None
+
+        def answered() -> R | None:
+            nonlocal pending
+            if self._bus is None:
+                return None
+            if pending is None:
+                pending = self._bus.ask(service, asked, ANSWER_SECONDS, **fields)
+            if (answer := pending.take()) is None:
+                return None
+            pending = None
+            is_answer = not isinstance(answer, NoAnswer | Refused)
+            return answer if is_answer and is_done(answer) else None
+
+        return self.until(answered, ANSWERS_SECONDS)
 
     def after(self, blow: Blow) -> Blow:
         """See that a robot that was shut stays where it is, then have it fence again."""
+        if self.broken:
+            broken = ", ".join(f"{count} x {what}" for what, count in self.broken.items())
+            blow = replace(blow, note=f"{blow.note} BROKEN so far: {broken}".strip())
         if self._mode not in SHUT:
             return replace(blow, note=f"{blow.note} went on, {self._mode}".strip())
         mode = self._mode
@@ -192,47 +248,3 @@ class Match(Job):
         if self._bus is not None:
             self._bus.close()
         super().close()
-
-
-def _kill(name: str) -> Callable[[Match, Chance], Blow]:
-    return lambda match, _chance: kill(match, name, signal.SIGKILL)
-
-
-def _kill_policy(match: Match, chance: Chance) -> Blow:
-    return kill(match, chance.one_of(("policy-antagonist", "policy-protagonist")))
-
-
-def _stop(match: Match, chance: Chance) -> Blow:
-    return stop(match, chance.one_of(EVERYBODY), chance.stop_seconds)
-
-
-def _jump(match: Match, chance: Chance) -> Blow:
-    """Step the clock of one process, and back after a while, as its clock service would."""
-    name = chance.one_of(EVERYBODY)
-    seconds = float(chance.generator.choice((-3600.0, 3600.0)))
-    pid = match.until(lambda: match.is_up(name) and match.pid(name), UP_SECONDS)
-    at = match.clock.now()
-    has_jumped = pid is not None and step(match.clocks, pid, seconds)
-    try:
-        match.rest(JUMP_SECONDS)
-    finally:
-        if pid is not None:
-            step(match.clocks, pid, -seconds)
-    over = match.clock.now()
-    return Blow(name, at, over, over if has_jumped else None, f"{seconds:+g} s")
-
-
-FAULTS: tuple[Fault[Match], ...] = (
-    Fault("robot-kill-policy", "kill -9", "one of two policies", _kill_policy),
-    Fault("robot-kill-referee", "kill -9", "referee", _kill("referee-0")),
-    Fault("robot-kill-robot-io", "kill -9", "robot_io", _kill("robot-io-0")),
-    Fault("robot-kill-router", "kill -9", "router of the match", _kill("router-0")),
-    Fault(
-        "robot-stop", "SIGSTOP for 30 s, then SIGCONT", "any process of the match", _stop,
-        seconds=30.0,
-    ),
-    Fault(
-        "robot-clock-jump", f"wall clock an hour off for {JUMP_SECONDS:g} s",
-        "any process of the match", _jump, seconds=JUMP_SECONDS,
-    ),
-)  # fmt: skip
