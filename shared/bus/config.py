@@ -20,6 +20,10 @@ MAX_MESSAGE = max(
 ) + MIB  # fmt: skip
 """Nothing longer leaves the network layer (bytes)."""
 
+MAX_NAMED = 4 * MAX_MESSAGE
+"""Up to here a locked router reads a message that is too long, to say whose it was (bytes): what is
+longer the library throws away without a word."""
+
 SHARED_MEMORY_POOL = 6 * MIB
 """What one process passes to others at a time (bytes); what does not fit goes through the socket.
 Whoever gets something maps the whole pool of its sender, so it counts once in each process."""
@@ -195,6 +199,7 @@ def router_json(cfg: BusConfig) -> str:
     if cfg.certificates:
         config["access_control"] = access_control()
         config["low_pass_filter"] = size_limits()
+        config["transport"]["link"]["rx"]["max_message_size"] = MAX_NAMED
     return json.dumps(config, indent=1)
 
 

@@ -14,7 +14,7 @@ import zenoh
 
 from services.jobs.certs.folder import keep
 from services.jobs.status import main as status
-from shared.bus.config import BusConfig
+from shared.bus.config import MAX_MESSAGE, BusConfig
 from shared.bus.tls import files_of, why_refused
 from shared.bus.zenoh import open_zenoh
 from shared.clock import SystemClock
@@ -176,6 +176,20 @@ def test_a_message_over_the_limit_of_its_topic_passes_no_router(
             time.sleep(0.1)
         time.sleep(0.3)
     assert set(got) == {BATS.max_bytes}
+    site.await_event("messages_refused", role="robot_io")
+
+
+def test_a_message_that_is_longer_than_any_may_be_is_refused_by_name(site: Locked) -> None:
+    huge = bytes(2 * MAX_MESSAGE)
+    got: list[int] = []
+    with session(site.client("page")) as reader, session(site.client("robot_io")) as writer:
+        reader.declare_subscriber(BATS_KEY, lambda it: got.append(len(it.payload)))
+        deadline = time.monotonic() + 20
+        while 10 not in got and time.monotonic() < deadline:
+            for payload in (huge, bytes(10)):
+                writer.put(BATS_KEY, payload, congestion_control=zenoh.CongestionControl.BLOCK)
+            time.sleep(0.1)
+    assert set(got) == {10}
     site.await_event("messages_refused", role="robot_io")
 
 
