@@ -11,6 +11,7 @@ from shared.bus.ports import free_port
 from shared.runtime.process import THREAD_LIMITS
 from shared.runtime.serve import EXIT_BUS_LOST
 from tests.integration.hosts.cluster import RIPOSTE, ROOT, until
+from tests.integration.security.secrets import assert_no_secret
 from tests.integration.small import SMALL
 from tests.integration.training.killing import assert_nothing_lost_nor_counted_twice
 from tests.integration.training.training import state_of, training
@@ -58,8 +59,10 @@ def site(tmp_path: Path) -> Site:
     return Site(tmp_path)
 
 
-def test_a_run_over_mutual_tls_goes_to_its_end_with_an_actor_that_joins(site: Site):
-    settings = (*SMALL, "train.actors=0", "train.record=false")
+def test_a_run_over_mutual_tls_goes_to_its_end_with_an_actor_that_joins_and_tells_no_key(
+    site: Site,
+):
+    settings = (*SMALL, "train.actors=0", "recorder.live=false")
     with training(site.run, str(site.site), overrides=settings) as run:
         actor = site.join("--connect", site.endpoint, "--certificates", str(site.theirs))
         try:
@@ -78,6 +81,8 @@ def test_a_run_over_mutual_tls_goes_to_its_end_with_an_actor_that_joins(site: Si
     assert (site.run / "report.html").exists()
     assert [path.name for path in site.elsewhere.iterdir()] == ["certificates"]
     assert_nothing_lost_nor_counted_twice(site.run)
+    assert (site.run / "recording.rrd").exists()
+    assert_no_secret([site.certificates], site.run, out + err)
 
 
 def test_an_actor_without_a_certificate_of_the_site_does_not_join(site: Site):

@@ -19,9 +19,10 @@ from shared.bus.tls import files_of, why_refused
 from shared.bus.zenoh import open_zenoh
 from shared.clock import SystemClock
 from shared.errors import BusError
-from shared.messages.topics import BATS, ROLES
+from shared.messages.topics import BATS
 from shared.runtime.serve import EXIT_BUS_LOST
 from tests.integration.security.locked import NOW, ROOT, Locked, greeting
+from tests.integration.security.secrets import assert_no_secret
 
 pytestmark = pytest.mark.zenoh
 BATS_KEY = "riposte/v1/probe/play/bats"
@@ -267,15 +268,3 @@ def test_no_key_is_in_what_a_locked_site_writes(
     text = heard + (tmp_path / "said.txt").read_text()
     assert_no_secret([site.certificates], tmp_path / "run", text)
     assert_no_secret([site.certificates], site.log.parent, site.output.read_text())
-
-
-def assert_no_secret(folders: list[Path], written: Path, said: str) -> None:
-    """Check that no line of any private key is in any file of a folder, or in a text."""
-    keys = [path for folder in folders for path in folder.rglob("*.key")]
-    assert len(keys) > len(ROLES)
-    secrets = {line for key in keys for line in key.read_bytes().splitlines() if b"--" not in line}
-    files = [path for path in written.rglob("*") if path.is_file()]
-    assert files
-    for data in (said.encode(), *(path.read_bytes() for path in files)):
-        assert b"PRIVATE KEY" not in data
-        assert not any(secret in data for secret in secrets)
