@@ -7,6 +7,7 @@ import json
 import math
 
 from benchmarks.scaling.model import (
+    RENEWALS,
     Coefficients,
     Job,
     Site,
@@ -88,7 +89,8 @@ def limits(cost: Coefficients) -> str:
         ),
         (
             "the league's one thread",
-            f"half full at {of_league:,} actors",
+            f"half full at {of_league:,} actors, "
+            f"{number(of_league * RENEWALS / job.lease_seconds)} renewals a second",
             "renewals, and what each answer looks through",
             "longer leases (`league.lease_seconds`)",
         ),
