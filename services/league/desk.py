@@ -57,7 +57,7 @@ class Desk:
         self._clock = clock
         self._rules = rules
         self._serial = serial
-        self._table = leases.LeaseTable(cfg.lease_seconds)
+        self.restart()
 
     @property
     def _state(self) -> RunState:
@@ -65,7 +65,9 @@ class Desk:
 
     def restart(self) -> None:
         """Give every live lease its full time, after the state was read back from the ledger."""
-        self._table = leases.LeaseTable(self._cfg.lease_seconds)
+        self._table = leases.LeaseTable(
+            self._cfg.lease_seconds, self._state.live_leases, self._clock.now()
+        )
 
     def note(self, incident: Incident) -> Receipt:
         """Enter an incident once."""
@@ -139,7 +141,7 @@ class Desk:
         if (granted.actor, granted.boot) != (renewal.actor, renewal.boot):
             return LeaseStatus(alive=False)
         self._table.renew(lease, self._clock.now())
-        actors = leases.training_actors(self._state)
+        actors = self._state.training_leases
         return LeaseStatus(
             alive=True,
             expires_in=self._cfg.lease_seconds,
@@ -149,10 +151,9 @@ class Desk:
     def lease(self, request: LeaseRequest) -> Lease:
         """Grant the work there is for an actor."""
         # Who asks has no work in hand, whatever we thought: an answer was lost, or it restarted.
-        for lease in list(self._state.live_leases):
-            held = self._state.leases[lease].grant
-            if held.actor == request.actor:
-                self._end_lease(lease, "asked_again" if held.boot == request.boot else "restarted")
+        for lease in list(self._state.live_leases_of.get(request.actor, ())):
+            boot = self._state.leases[lease].grant.boot
+            self._end_lease(lease, "asked_again" if boot == request.boot else "restarted")
         if request.num_envs < 1:
             return Lease(lease="", kind="none", reason=f"num_envs is {request.num_envs}, below 1")
         granted = leases.grant(self._state, request)

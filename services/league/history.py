@@ -109,6 +109,10 @@ class RunState:
     leases_granted: int = 0
     live_leases: dict[str, None] = dataclasses.field(default_factory=dict[str, None])
     """Ids of those that have not ended, oldest first."""
+    live_leases_of: dict[str, list[str]] = dataclasses.field(default_factory=dict[str, list[str]])
+    """The same by actor."""
+    training_leases: int = 0
+    """How many of those that have not ended are for training."""
     ended_leases: list[str] = dataclasses.field(default_factory=list[str])
     """Ids in the order they ended."""
     result_names: Names = dataclasses.field(default_factory=Names)
@@ -319,12 +323,20 @@ class RunState:
         self.leases[event.lease] = LeaseRecord(grant=event, granted_at_ns=at_ns)
         self.leases_granted += 1
         self.live_leases[event.lease] = None
+        self.live_leases_of.setdefault(event.actor, []).append(event.lease)
+        self.training_leases += event.work == "train"
 
     def _lease_ended(self, event: events.LeaseEnded, at_ns: int) -> None:
         self.leases[event.lease] = dataclasses.replace(
             self.leases[event.lease], end_reason=event.reason, ended_at_ns=at_ns
         )
         del self.live_leases[event.lease]
+        granted = self.leases[event.lease].grant
+        self.training_leases -= granted.work == "train"
+        own = self.live_leases_of[granted.actor]
+        own.remove(event.lease)
+        if not own:
+            del self.live_leases_of[granted.actor]
         self.ended_leases.append(event.lease)
         if self.remembers is not None and len(self.ended_leases) >= 2 * ENDED_LEASES:
             for lease in self.ended_leases[:ENDED_LEASES]:

@@ -4,7 +4,6 @@ A lease is the only claim an actor has. An actor that vanishes stops renewing, i
 and what it had promised is granted again; nothing else remembers it.
 """
 
-import dataclasses
 import hashlib
 import itertools
 import math
@@ -118,11 +117,6 @@ def is_chunk_open(state: RunState, granted: LeaseGranted) -> bool:
     return not any(record.played[granted.first_bout : granted.first_bout + granted.bouts])
 
 
-def training_actors(state: RunState) -> int:
-    """Return how many actors hold a training lease."""
-    return sum(state.leases[lease].grant.work == "train" for lease in state.live_leases)
-
-
 def lease_message(
     state: RunState, granted: LeaseGranted, cfg: LeagueConfig, *, serial: bool
 ) -> Lease:
@@ -140,7 +134,7 @@ def lease_message(
         ),
         seed=granted.seed,
         expires_in=cfg.lease_seconds,
-        window=lease_window(cfg, training_actors(state), serial=serial),
+        window=lease_window(cfg, state.training_leases, serial=serial),
     )
 
 
@@ -177,7 +171,6 @@ def _overlap(one: LeaseGranted, other: LeaseGranted) -> bool:
     )
 
 
-@dataclasses.dataclass
 class LeaseTable:
     """When each live lease lapses, on the league's own monotonic clock.
 
@@ -185,21 +178,30 @@ class LeaseTable:
     lease its full time again.
     """
 
-    seconds: float
-    lapses_at: dict[str, float] = dataclasses.field(default_factory=dict[str, float])
+    def __init__(self, seconds: float, live: Iterable[str], now: float) -> None:
+        """Give every live lease its full time.
+
+        Args:
+            seconds: from a renewal until a lease lapses.
+            live: ids.
+            now: by the league's clock (s).
+        """
+        self._seconds = seconds
+        self._lapses_at = dict.fromkeys(live, now + seconds)
+        """By id, the first to lapse in front: all leases have the same time."""
 
     def renew(self, lease: str, now: float) -> None:
         """Give a lease its full time from now."""
-        self.lapses_at[lease] = now + self.seconds
+        self._lapses_at.pop(lease, None)
+        self._lapses_at[lease] = now + self._seconds
 
     def lapsed(self, state: RunState, now: float) -> list[str]:
-        """Return the live leases whose time is over, oldest first."""
-        self.follow(state, now)
-        return [lease for lease, at in self.lapses_at.items() if at <= now]
-
-    def follow(self, state: RunState, now: float) -> None:
-        """Drop the leases that have ended, and time those that are new here."""
-        live = state.live_leases
-        if self.lapses_at.keys() == live.keys():
-            return
-        self.lapses_at = {lease: self.lapses_at.get(lease, now + self.seconds) for lease in live}
+        """Return the live leases whose time is over, oldest first; looks at no others."""
+        over = itertools.takewhile(
+            lambda item: item[1] <= now or item[0] not in state.live_leases,
+            self._lapses_at.items(),
+        )
+        found = [lease for lease, _ in over]
+        for lease in found:
+            del self._lapses_at[lease]
+        return [lease for lease in found if lease in state.live_leases]

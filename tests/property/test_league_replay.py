@@ -135,6 +135,11 @@ def test_replay_is_the_live_state_and_everything_acknowledged_is_there_once(
         assert {f"{agent}:{number}" for agent, number in mess.versions} <= set(versions)
         for draw in drawn_again(entries)[1]:
             assert draw.is_replayed
+        held = [(state.leases[lease].grant, lease) for lease in state.live_leases]
+        assert state.training_leases == sum(grant.work == "train" for grant, _ in held)
+        assert sorted((a, lease) for a, own in state.live_leases_of.items() for lease in own) == (
+            sorted((grant.actor, lease) for grant, lease in held)
+        )
         for record in state.evaluations.values():
             assert sum(record.played) == record.done
         for record in state.stages:
