@@ -29,7 +29,7 @@ def text_of(verdict: Verdict) -> str:
         for one in verdict.criteria
     ]
     disk = ", ".join(f"{job} {rate:.0f} MB/h" for job, rate in verdict.disk_mb_per_hour.items())
-    return "\n".join([*lines, f"    disk: {disk}"])
+    return "\n".join([*lines, f"    {verdict.as_measured}", f"    disk: {disk}"])
 
 
 def block_of(verdict: Verdict, kept: Kept) -> str:
@@ -63,7 +63,9 @@ def block_of(verdict: Verdict, kept: Kept) -> str:
         "20 equal blocks, with Student's 95 % interval. A criterion is *met* when the whole "
         "interval keeps its limit, *missed* when the whole interval breaks it, else *undecided*; "
         "the soak is met when all are. A soak of less than half an hour only shows that it runs: "
-        "its slopes are undecided, whatever they are.",
+        "its slopes are undecided, whatever they are. Machines in a cloud change their speed by "
+        "the hour: the training rate is judged at the machine's median speed, by what a control "
+        f"tick of robot_io costs. {verdict.as_measured}.",
         "",
         f"Limits: {MEMORY_LIMIT:g} MB an hour of memory in each process; {COUNT_LIMIT:g} file "
         f"handle and thread an hour; {LATENESS_LIMIT:g} ms an hour of the control's lateness (99th "

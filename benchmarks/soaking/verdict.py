@@ -1,6 +1,7 @@
 """What the samples of a soak say: slopes with intervals, each against its limit."""
 
 import dataclasses
+import statistics
 from collections.abc import Callable, Sequence
 from typing import Literal
 
@@ -18,7 +19,9 @@ LATENESS_LIMIT = 1.0
 LATE_SHARE_LIMIT = 0.01
 """Of the control ticks: more than 10 ms late, or lost."""
 RATE_LIMIT = 0.05
-"""Share of the training rate that may go lost in an hour."""
+"""Share of the training rate that may go lost in an hour, at the machine's median speed."""
+REFERENCE = "play/robot-io-0"
+"""A process whose work in a tick is always the same: when it costs more, the machine is slower."""
 WARM_UP_SHARE, LEAST_WARM_UP, MOST_WARM_UP = 0.1, 30.0, 600.0
 """Of a soak are left out of all slopes: caches fill, allocators settle (share; s; s)."""
 
@@ -54,6 +57,8 @@ class Verdict:
     disk_mb_per_hour: dict[str, float]
     ended: str
     """Why it ended early; empty when it did not."""
+    as_measured: str
+    """How the training rate changed, and what the reference's tick cost, in words."""
 
     @property
     def outcome(self) -> Outcome:
@@ -122,11 +127,12 @@ def judge(samples: Sequence[Sample], ended: str = "") -> Verdict:
         seconds=seconds,
         samples=len(samples),
         warm_up=warm_up,
-        rate=sum(rate for _, rate in rates) / max(len(rates), 1),
+        rate=sum(one.rate for one in rates) / max(len(rates), 1),
         bouts=samples[-1].bouts,
         growth=growth,
         disk_mb_per_hour=_disk(kept),
         ended=ended,
+        as_measured=_as_measured(rates),
     )
 
 
@@ -188,35 +194,88 @@ def _late_ticks(kept: Sequence[Sample]) -> list[Criterion]:
     ]  # fmt: skip
 
 
-def _rates(kept: Sequence[Sample]) -> list[tuple[float, float]]:
-    """Return the training rate between versions: instant and samples a second.
+@dataclasses.dataclass(frozen=True)
+class _Stretch:
+    """A minute of training."""
+
+    at: float
+    """Its middle (s)."""
+    rate: float
+    """Samples a second."""
+    tick_cost: float
+    """CPU seconds of the reference for a control tick; 0 where it did not run."""
+
+
+def _rates(kept: Sequence[Sample]) -> list[_Stretch]:
+    """Return the training rate between versions.
 
     Samples of a soak come more often than versions, or not; only stretches of a minute say much.
     """
-    made: list[tuple[float, float]] = []
+    made: list[_Stretch] = []
     begin = kept[0]
     stretch = min(60.0, (kept[-1].at - kept[0].at) / 8)
     for sample in kept[1:]:
         if sample.at - begin.at >= stretch:
             samples = (sample.version - begin.version) * sample.batch_samples
-            middle = (sample.at + begin.at) / 2
-            made.append((middle, samples / (sample.at - begin.at)))
+            rate = samples / (sample.at - begin.at)
+            made.append(_Stretch((sample.at + begin.at) / 2, rate, _tick_cost(begin, sample)))
             begin = sample
     return made
 
 
-def _rate(rates: Sequence[tuple[float, float]]) -> Criterion:
-    found = slope([at for at, _ in rates], [rate for _, rate in rates])
-    if found is None or found.mean <= 0.0:
+def _tick_cost(begin: Sample, end: Sample) -> float:
+    one, other = (it.processes.get(REFERENCE) for it in (begin, end))
+    ticks = (end.ticks - end.ticks_lost) - (begin.ticks - begin.ticks_lost)
+    if one is None or other is None or one.pid != other.pid or ticks <= 0:
+        return 0.0
+    return (other.cpu_seconds - one.cpu_seconds) / ticks
+
+
+def _rate(stretches: Sequence[_Stretch]) -> Criterion:
+    """Return the criterion on the training rate, at the speed that the machine had in the median.
+
+    Where the same work costs a tenth more CPU than in the median, the machine is a tenth slower,
+    and so is a training that takes all of its core.
+    """
+    costs = [one.tick_cost for one in stretches]
+    usual = statistics.median(costs) if costs and min(costs) > 0.0 else 0.0
+    rates = [one.rate * (one.tick_cost / usual if usual else 1.0) for one in stretches]
+    loss = _loss([one.at for one in stretches], rates)
+    if loss is None:
         return Criterion("training rate", "nothing was learned", "more than 0", "missed")
-    loss = dataclasses.replace(
-        hourly(found), value=-found.value * HOUR / found.mean, low=-found.high * HOUR / found.mean,
-        high=-found.low * HOUR / found.mean,
-    )  # fmt: skip
+    name = "loss of training rate" + (", at the machine's median speed" if usual else "")
     return Criterion(
-        "loss of training rate", _text(loss, "an hour", percent=True),
-        f"at most {RATE_LIMIT:.0%} an hour", judged(loss.low, loss.high, RATE_LIMIT),
+        name, _text(loss, "an hour", percent=True), f"at most {RATE_LIMIT:.0%} an hour",
+        judged(loss.low, loss.high, RATE_LIMIT),
     )  # fmt: skip
+
+
+def _as_measured(stretches: Sequence[_Stretch]) -> str:
+    times = [one.at for one in stretches]
+    loss = _loss(times, [one.rate for one in stretches])
+    less = _loss(times, [one.tick_cost for one in stretches])
+    if loss is None or less is None:
+        return ""
+    rate, cost = (
+        _text(dataclasses.replace(one, value=-one.value, low=-one.high, high=-one.low), "an hour",
+              percent=True)
+        for one in (loss, less)
+    )  # fmt: skip
+    return (
+        f"As it was measured, the training rate changed by {rate}, while the CPU of a control "
+        f"tick, whose work is always the same, changed by {cost}: so did the machine's speed"
+    )
+
+
+def _loss(times: Sequence[float], values: Sequence[float]) -> Slope | None:
+    """Return by which share of its mean a series falls in an hour."""
+    found = slope(times, values)
+    if found is None or found.mean <= 0.0:
+        return None
+    share = HOUR / found.mean
+    return dataclasses.replace(
+        found, value=-found.value * share, low=-found.high * share, high=-found.low * share
+    )
 
 
 def _disk(kept: Sequence[Sample]) -> dict[str, float]:

@@ -16,6 +16,7 @@ from services.recorder.tap import Heard
 from shared.errors import RiposteError
 from shared.messages.play import RefereeState
 from shared.runtime.files import MIB, atomic_write
+from shared.runtime.process import release_memory
 from shared.telemetry.archive import (
     FINISHED,
     INFO_FILE,
@@ -29,6 +30,7 @@ from shared.telemetry.archive import (
     parquet_of,
     read_info,
     read_journal,
+    release_buffers,
 )
 from shared.telemetry.streams import BY_NAME, REFEREE, TICK, TIME, Rows
 
@@ -297,6 +299,9 @@ class Archivist:
             score=info.score,
             dropped=sum(lost.values()),
         )
+        yield
+        release_buffers()
+        release_memory()
 
     def _find_unfinished(self, directory: Path) -> None:
         try:

@@ -191,6 +191,11 @@ class Journal:
         os.close(self._descriptor)
 
 
+def release_buffers() -> None:
+    """Give the memory that files were made in back to the system: Arrow's allocator keeps it."""
+    pa.default_memory_pool().release_unused()
+
+
 def parquet_of(stream: Stream, rows: Rows, info: BoutInfo) -> bytes:
     """Return the finished file of a stream."""
     schema = _schema(stream).with_metadata({METADATA_KEY: msgspec.json.encode(info)})

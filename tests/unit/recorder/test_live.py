@@ -148,6 +148,14 @@ def test_the_archive_holds_every_number_with_its_unit_and_its_provenance(tmp_pat
     assert fencing.recorder.health().counters["bouts_archived"] == 1
 
 
+def test_memory_is_given_back_once_a_bout_is_filed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    given: list[str] = []
+    for name in ("release_buffers", "release_memory"):
+        monkeypatch.setattr(f"services.recorder.archivist.{name}", lambda it=name: given.append(it))
+    fenced(tmp_path)
+    assert given == ["release_buffers", "release_memory"]
+
+
 def test_a_file_of_the_archive_means_something_without_riposte(tmp_path: Path):
     import pyarrow.parquet as pq
 

@@ -100,6 +100,30 @@ def test_growth_beyond_its_limit_is_missed_and_nothing_else_is(changed, missed: 
     assert [name for name, outcome in found.items() if outcome != "met"] == [missed]
 
 
+def on_a_slowing_machine(at: float, *, rate: float) -> Sample:
+    """Everything costs a third more CPU an hour later; the training falls by so much an hour."""
+    slow = at + 0.33 * at * at / HOUR / 2
+    robot = ProcessUse(pid=9, rss_bytes=10**8, files=30, threads=4, cpu_seconds=0.2 * slow)
+    league = ProcessUse(pid=7, rss_bytes=10**8, files=30, threads=4, cpu_seconds=at)
+    version = 10_000 + 1000 * (at - rate * at * at / HOUR / 2)
+    processes = {"train/league-0": league, "play/robot-io-0": robot}
+    return sample(at, version=int(version), processes=processes)
+
+
+def test_a_training_as_slow_as_its_machine_has_lost_nothing_itself():
+    verdict = judge([on_a_slowing_machine(at, rate=0.2) for at in range(0, 7200, 5)])
+    (rate,) = (one for one in verdict.criteria if "training rate" in one.name)
+    assert rate.outcome == "met", rate
+    assert "changed by -" in verdict.as_measured
+    assert "changed by +" in verdict.as_measured
+
+
+def test_a_training_that_gets_slower_than_its_machine_is_missed():
+    verdict = judge([on_a_slowing_machine(at, rate=0.45) for at in range(0, 7200, 5)])
+    (rate,) = (one for one in verdict.criteria if "training rate" in one.name)
+    assert rate.outcome == "missed", rate
+
+
 def test_a_noisy_soak_is_undecided_where_the_noise_hides_the_limit():
     generator = np.random.default_rng(0)
     noisy = [sample(at, rss=100e6 + 3e7 * generator.standard_normal()) for at in range(0, 7200, 5)]
