@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from benchmarks.peer_loops.work import INPUTS, OUTPUTS, Stopwatch, Timing, Work, main
+from benchmarks.peer_loops.work import INPUTS, OUTPUTS, Timing, Work, main
 
 
 class RunningScale:
@@ -32,6 +32,10 @@ class RunningScale:
         self.variance = (spread + delta**2 * self.count * count / total) / total
         self.mean = self.mean + delta * count / total
         self.count = total
+        return self.scaled(rows)
+
+    def scaled(self, rows: np.ndarray) -> np.ndarray:
+        """Return float32 rows in units of the standard deviation so far."""
         scaled = (rows - self.mean) / np.sqrt(self.variance + 1e-8)
         return np.clip(scaled, -10.0, 10.0).astype(np.float32)
 
@@ -50,8 +54,8 @@ def _network(sizes: list[int], gain: float) -> nn.Sequential:
 def loop(work: Work) -> Timing:
     """Train until the window is over."""
     torch.set_num_threads(work.threads)
-    torch.manual_seed(1)
-    watch = Stopwatch(work)
+    torch.manual_seed(work.seed)
+    watch = work.stopwatch()
     bouts = work.batch()
     actor = _network([INPUTS, *work.hidden_dims, OUTPUTS], 0.01)
     critic = _network([INPUTS, *work.hidden_dims, 1], 1.0)
@@ -67,6 +71,11 @@ def loop(work: Work) -> Timing:
     seen = torch.from_numpy(scale(bouts.reset()))
     ended = torch.zeros(N)
     samples = 0
+
+    def act(rows: np.ndarray) -> np.ndarray:
+        with torch.no_grad():
+            return actor(torch.from_numpy(scale.scaled(rows))).clamp(-1.0, 1.0).numpy()
+
     while True:
         with torch.no_grad():
             for t in range(T):
@@ -105,7 +114,7 @@ def loop(work: Work) -> Timing:
                 nn.utils.clip_grad_norm_(parameters, work.max_grad_norm)
                 adam.step()
         samples += T * N
-        if watch.update_done(samples):
+        if watch.update_done(samples, act):
             return watch.timing(samples)
 
 

@@ -14,7 +14,7 @@ from rsl_rl.env import VecEnv
 from rsl_rl.runners import OnPolicyRunner
 from tensordict import TensorDict
 
-from benchmarks.peer_loops.work import OUTPUTS, Stopwatch, Timing, Work, main
+from benchmarks.peer_loops.work import OUTPUTS, Timing, Work, main
 from services.jobs.settings import Settings
 from services.learner.config import LearnerConfig
 
@@ -91,17 +91,23 @@ def runner_config(cfg: LearnerConfig, steps: int) -> dict:
 def loop(work: Work) -> Timing:
     """Train until the window is over."""
     torch.set_num_threads(work.threads)
-    torch.manual_seed(0)
-    watch = Stopwatch(work)
+    torch.manual_seed(work.seed)
+    watch = work.stopwatch()
     env = BatchedBouts(work)
     cfg = Settings.load(None).learner
     samples = 0
     with contextlib.redirect_stdout(io.StringIO()):
         runner = OnPolicyRunner(env, runner_config(cfg, work.steps), log_dir=None)
+
+        def act(obs: np.ndarray) -> np.ndarray:
+            seen = TensorDict({"policy": torch.from_numpy(obs)}, batch_size=[len(obs)])
+            with torch.inference_mode():
+                return runner.get_inference_policy()(seen).numpy()
+
         while True:
             runner.learn(1)
             samples += work.steps * work.num_envs
-            if watch.update_done(samples):
+            if watch.update_done(samples, act):
                 return watch.timing(samples)
 
 

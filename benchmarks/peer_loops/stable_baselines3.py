@@ -75,7 +75,11 @@ class _Clock(BaseCallback):
 
     def _on_rollout_start(self) -> None:
         if self.num_timesteps:
-            self.is_over = self._watch.update_done(self.num_timesteps)
+            self.is_over = self._watch.update_done(self.num_timesteps, self._act)
+
+    def _act(self, obs: np.ndarray) -> np.ndarray:
+        seen = self.model.get_vec_normalize_env().normalize_obs(obs)
+        return self.model.predict(seen, deterministic=True)[0]
 
     def _on_step(self) -> bool:
         return not self.is_over
@@ -84,14 +88,15 @@ class _Clock(BaseCallback):
 def loop(work: Work) -> Timing:
     """Train until the window is over."""
     torch.set_num_threads(work.threads)
-    watch = Stopwatch(work)
+    watch = work.stopwatch()
     env = VecNormalize(BatchedBouts(work), norm_reward=False, gamma=work.gamma)
     layers = list(work.hidden_dims)
     ppo = PPO(
         "MlpPolicy", env, learning_rate=work.learning_rate, n_steps=work.steps,
         batch_size=work.batch_samples // work.minibatches, n_epochs=work.epochs, gamma=work.gamma,
         gae_lambda=work.gae_lambda, clip_range=work.clip, ent_coef=work.entropy_coef,
-        vf_coef=work.value_loss_coef / 2, max_grad_norm=work.max_grad_norm, seed=1, device="cpu",
+        vf_coef=work.value_loss_coef / 2, max_grad_norm=work.max_grad_norm, seed=work.seed,
+        device="cpu",
         policy_kwargs={
             "net_arch": {"pi": layers, "vf": layers}, "activation_fn": nn.Tanh,
             "log_std_init": float(np.log(work.initial_std)),

@@ -19,6 +19,7 @@ import numpy as np
 import psutil
 from numpy.typing import NDArray
 
+from benchmarks.peer_loops.skill import EVERY, MOST_UPDATES, Act, share_in_target
 from shared.messages.training import ACTION_DIM, OBS_DIM
 from shared.sim.bouts import Bouts, Turn
 from shared.sim.task import Task
@@ -54,21 +55,28 @@ class Work(msgspec.Struct, frozen=True, kw_only=True):
     """Length of the window."""
     threads: int = 1
     """Of torch, where the loop is one process."""
+    seed: int = 1
+    skill: float = 0.0
+    """Share of the steps in the target at which the loop ends; 0: at the end of the window."""
 
     @property
     def steps(self) -> int:
         """Return the control steps of one rollout."""
         return self.batch_samples // self.num_envs
 
-    def batch(self, num_envs: int = 0, seed: int = 0) -> "Batch":
+    def batch(self, num_envs: int = 0, seed: int | None = None) -> "Batch":
         """Return the bouts.
 
         Args:
             num_envs: how many; all of them by default.
-            seed: of their beginnings.
+            seed: of their beginnings; the work's by default.
         """
         bouts = Bouts(Task(), "antagonist", Path(self.opponent), num_envs or self.num_envs)
-        return Batch(bouts, seed)
+        return Batch(bouts, self.seed if seed is None else seed)
+
+    def stopwatch(self) -> "Stopwatch":
+        """Return what says when the loop is over."""
+        return Race(self) if self.skill else Stopwatch(self)
 
 
 class Batch:
@@ -103,6 +111,8 @@ class Timing(msgspec.Struct, frozen=True, kw_only=True):
     """From the start of the process."""
     resident_mib: float
     """Of the process and all its children; memory that they share counts in each."""
+    skill: float = 0.0
+    """Share of the steps in the target, as it was measured last."""
 
 
 class Stopwatch:
@@ -116,16 +126,16 @@ class Stopwatch:
         self._begin = (0, 0, 0.0, 0.0)
         self._resident = 0.0
 
-    def update_done(self, samples: int) -> bool:
-        """Note the end of an update; return whether the window is over.
+    def update_done(self, samples: int, act: Act | None = None) -> bool:
+        """Note the end of an update; return whether the loop is over.
 
         Args:
             samples: learned from since the start.
+            act: plays float32[N, 27] as the policy now would, without noise.
         """
+        del act
         now = time.monotonic()
-        self._updates += 1
-        if self._updates == 1:
-            self._first_update_s = time.time() - self._me.create_time()  # noqa: TID251
+        self._count()
         if self._updates <= WARM_UP:
             self._begin = (samples, self._updates, now, self._cpu())
             return False
@@ -143,6 +153,15 @@ class Stopwatch:
             resident_mib=sum(one.memory_info().rss for one in self._all()) / 2**20,
         )
 
+    def _count(self) -> None:
+        self._updates += 1
+        if self._updates == 1:
+            self._first_update_s = self._age()
+
+    def _age(self) -> float:
+        """Return the seconds since the process was started."""
+        return time.time() - self._me.create_time()  # noqa: TID251
+
     def _all(self) -> list[psutil.Process]:
         return [self._me, *self._me.children(recursive=True)]
 
@@ -153,6 +172,42 @@ class Stopwatch:
             times = one.cpu_times()
             total += times.user + times.system + times.children_user + times.children_system
         return total
+
+
+class Race(Stopwatch):
+    """Runs from the start of the process to a skill, and stands still while that is measured."""
+
+    def __init__(self, work: Work) -> None:
+        super().__init__(work)
+        self._measuring_s = self._measuring_cpu_s = self._skill = 0.0
+
+    def update_done(self, samples: int, act: Act | None = None) -> bool:
+        """Note the end of an update, measure after some; return whether the skill is there.
+
+        It gives up after ``MOST_UPDATES``.
+        """
+        self._count()
+        if self._updates % EVERY:
+            return False
+        if act is None:
+            raise ValueError("this loop does not say how its policy plays: it cannot race")
+        began, cpu = time.monotonic(), self._cpu()
+        self._skill = share_in_target(act)
+        self._measuring_s += time.monotonic() - began
+        self._measuring_cpu_s += self._cpu() - cpu
+        return self._skill >= self._work.skill or self._updates >= MOST_UPDATES
+
+    def timing(self, samples: int) -> Timing:
+        """Return the race, which ends now."""
+        return Timing(
+            samples=samples,
+            updates=self._updates,
+            wall_s=self._age() - self._measuring_s,
+            cpu_s=self._cpu() - self._measuring_cpu_s,
+            first_update_s=self._first_update_s,
+            resident_mib=sum(one.memory_info().rss for one in self._all()) / 2**20,
+            skill=self._skill,
+        )
 
 
 def main(loop: Callable[[Work], Timing]) -> None:

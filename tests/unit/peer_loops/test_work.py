@@ -1,8 +1,11 @@
 import msgspec
+import numpy as np
+import pytest
 
 from benchmarks.environments import REQUIREMENTS
 from benchmarks.peer_loops.running import work_of
-from benchmarks.peer_loops.work import WARM_UP, Stopwatch, Work
+from benchmarks.peer_loops.skill import EVERY, MOST_UPDATES, share_in_target
+from benchmarks.peer_loops.work import WARM_UP, Race, Stopwatch, Work
 from benchmarks.peers import PEERS
 from services.jobs.settings import Settings
 
@@ -46,3 +49,51 @@ def test_every_environment_of_a_benchmark_is_pinned():
         lines = path.read_text(encoding="utf-8").split()
         assert lines
         assert all("==" in line for line in lines)
+
+
+def racing(monkeypatch: pytest.MonkeyPatch, *skills: float) -> Race:
+    """A race whose policy is measured to have one skill after the other."""
+    found = iter(skills)
+    monkeypatch.setattr("benchmarks.peer_loops.work.share_in_target", lambda act: next(found))
+    watch = msgspec.structs.replace(work(0.0), skill=0.95).stopwatch()
+    assert isinstance(watch, Race)
+    return watch
+
+
+def still(obs: np.ndarray) -> np.ndarray:
+    return np.zeros((len(obs), 6), np.float32)
+
+
+def test_a_race_ends_with_the_skill_and_measures_it_now_and_then(monkeypatch: pytest.MonkeyPatch):
+    watch = racing(monkeypatch, 0.2, 0.94, 0.96)
+    ends = [watch.update_done(80 * update, still) for update in range(1, 3 * EVERY + 1)]
+    assert ends == [False] * (3 * EVERY - 1) + [True]
+    timing = watch.timing(80 * 3 * EVERY)
+    assert (timing.updates, timing.samples, timing.skill) == (3 * EVERY, 80 * 3 * EVERY, 0.96)
+
+
+def test_a_race_that_nobody_wins_ends_too(monkeypatch: pytest.MonkeyPatch):
+    watch = racing(monkeypatch, *[0.1] * MOST_UPDATES)
+    ends = [watch.update_done(80 * update, still) for update in range(1, MOST_UPDATES + 1)]
+    assert ends.index(True) == MOST_UPDATES - 1
+
+
+def test_the_clock_of_a_race_stands_still_while_it_is_measured(monkeypatch: pytest.MonkeyPatch):
+    now = 100.0
+
+    def measured(act: object) -> float:
+        nonlocal now
+        now += 50.0
+        return 0.99
+
+    monkeypatch.setattr("benchmarks.peer_loops.work.time.monotonic", lambda: now)
+    monkeypatch.setattr("benchmarks.peer_loops.work.Stopwatch._age", lambda self: now - 90.0)
+    monkeypatch.setattr("benchmarks.peer_loops.work.share_in_target", measured)
+    watch = msgspec.structs.replace(work(0.0), skill=0.95).stopwatch()
+    for update in range(1, EVERY + 1):
+        watch.update_done(80 * update, still)
+    assert watch.timing(80).wall_s == pytest.approx(10.0)
+
+
+def test_an_arm_that_holds_still_is_hardly_ever_in_the_target():
+    assert share_in_target(still, bouts=2) < 0.05
