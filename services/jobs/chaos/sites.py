@@ -4,6 +4,7 @@ import contextlib
 from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from shared.testing.network.commands import unavailable
 from shared.testing.network.hosts import Network
 
 Make = Callable[[Path, int], Job]
+Prepare = Callable[[Path, Clock], AbstractContextManager[Make]]
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class Site:
 
     name: str
     faults: tuple[Fault[Any], ...]
-    prepare: Callable[[Path, Clock], AbstractContextManager[Make]]
+    prepare: Prepare
     """Given a folder for the runs, returns what makes one; undoes itself afterwards."""
     why_not: Callable[[], str]
     """Why there can be none here; empty when there can."""
@@ -35,48 +37,41 @@ class Site:
     """Whether the folders of its runs are left where they are."""
 
 
-@contextlib.contextmanager
-def _plain(folder: Path, watch: Clock) -> Generator[Make]:
-    variables = clock.environment(folder)
-    yield lambda at, seed: Job(at, watch, seed=seed, environment=variables, clocks=folder)
+def _plain(kind: type[Job]) -> Prepare:
+    """Return what makes runs whose processes' clocks can be stepped."""
+
+    @contextlib.contextmanager
+    def prepare(folder: Path, watch: Clock) -> Generator[Make]:
+        variables = clock.environment(folder)
+        yield lambda at, seed: kind(at, watch, seed=seed, environment=variables, clocks=folder)
+
+    return prepare
 
 
-@contextlib.contextmanager
-def _on_small_disk(folder: Path, watch: Clock) -> Generator[Make]:
-    damage.mount_disk(folder)
-    try:
-        yield lambda at, seed: Job(at, watch, seed=seed)
-    finally:
-        damage.unmount_disk(folder)
+def _on_small_disk(kind: Callable[..., Job]) -> Prepare:
+    """Return what makes runs on a disk of their own, which is soon full."""
+
+    @contextlib.contextmanager
+    def prepare(folder: Path, watch: Clock) -> Generator[Make]:
+        damage.mount_disk(folder)
+        try:
+            yield lambda at, seed: kind(at, watch, seed=seed)
+        finally:
+            damage.unmount_disk(folder)
+
+    return prepare
 
 
-@contextlib.contextmanager
-def _split(folder: Path, watch: Clock) -> Generator[Make]:
-    del folder
-    with Network() as net:
-        yield lambda at, seed: network.SplitJob(net, at, watch, seed=seed)
+def _over_network(kind: Callable[..., Job]) -> Prepare:
+    """Return what makes runs with another host."""
 
+    @contextlib.contextmanager
+    def prepare(folder: Path, watch: Clock) -> Generator[Make]:
+        del folder
+        with Network() as net:
+            yield lambda at, seed: kind(net, at, watch, seed=seed)
 
-@contextlib.contextmanager
-def _match(folder: Path, watch: Clock) -> Generator[Make]:
-    variables = clock.environment(folder)
-    yield lambda at, seed: Match(at, watch, seed=seed, environment=variables, clocks=folder)
-
-
-@contextlib.contextmanager
-def _match_on_small_disk(folder: Path, watch: Clock) -> Generator[Make]:
-    damage.mount_disk(folder)
-    try:
-        yield lambda at, seed: Match(at, watch, seed=seed, is_recorded=True)
-    finally:
-        damage.unmount_disk(folder)
-
-
-@contextlib.contextmanager
-def _far_match(folder: Path, watch: Clock) -> Generator[Make]:
-    del folder
-    with Network() as net:
-        yield lambda at, seed: FarMatch(net, at, watch, seed=seed)
+    return prepare
 
 
 def _always() -> str:
@@ -87,16 +82,20 @@ SITES = (
     Site(
         "training",
         (*signals.FAULTS, damage.FAULTS[0], *clock.FAULTS, *guests.FAULTS),
-        _plain,
+        _plain(Job),
         _always,
     ),
-    Site("disk", damage.FAULTS[1:], _on_small_disk, damage.why_no_disk, is_kept=False),
-    Site("network", network.FAULTS, _split, unavailable),
-    Site("robot", robot.FAULTS, _match, _always),
+    Site("disk", damage.FAULTS[1:], _on_small_disk(Job), damage.why_no_disk, is_kept=False),
+    Site("network", network.FAULTS, _over_network(network.SplitJob), unavailable),
+    Site("robot", robot.FAULTS, _plain(Match), _always),
     Site(
-        "match-on-disk", robot.DISK_FAULTS, _match_on_small_disk, damage.why_no_disk, is_kept=False
+        "match-on-disk",
+        robot.DISK_FAULTS,
+        _on_small_disk(partial(Match, is_recorded=True)),
+        damage.why_no_disk,
+        is_kept=False,
     ),
-    Site("match-over-network", robot.HOST_FAULTS, _far_match, unavailable),
+    Site("match-over-network", robot.HOST_FAULTS, _over_network(FarMatch), unavailable),
 )
 FAULTS: dict[str, Fault[Any]] = {fault.name: fault for site in SITES for fault in site.faults}
 ROBOT = frozenset(fault.name for fault in robot.ALL)
