@@ -64,8 +64,8 @@ def block_of(verdict: Verdict, kept: Kept) -> str:
         "interval keeps its limit, *missed* when the whole interval breaks it, else *undecided*; "
         "the soak is met when all are. A soak of less than half an hour only shows that it runs: "
         "its slopes are undecided, whatever they are. Machines in a cloud change their speed by "
-        "the hour: the training rate is judged at the machine's median speed, by what a control "
-        f"tick of robot_io costs. {verdict.as_measured}.",
+        "the hour: the training rate is judged as it was and at the machine's median speed, by "
+        f"what a control tick of robot_io costs. {verdict.as_measured}.",
         "",
         f"Limits: {MEMORY_LIMIT:g} MB an hour of memory in each process; {COUNT_LIMIT:g} file "
         f"handle and thread an hour; {LATENESS_LIMIT:g} ms an hour of the control's lateness (99th "

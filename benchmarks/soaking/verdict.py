@@ -19,7 +19,7 @@ LATENESS_LIMIT = 1.0
 LATE_SHARE_LIMIT = 0.01
 """Of the control ticks: more than 10 ms late, or lost."""
 RATE_LIMIT = 0.05
-"""Share of the training rate that may go lost in an hour, at the machine's median speed."""
+"""Share of the training rate that may go lost in an hour."""
 REFERENCE = "play/robot-io-0"
 """A process whose work in a tick is always the same: when it costs more, the machine is slower."""
 WARM_UP_SHARE, LEAST_WARM_UP, MOST_WARM_UP = 0.1, 30.0, 600.0
@@ -117,7 +117,7 @@ def judge(samples: Sequence[Sample], ended: str = "") -> Verdict:
         _counts(kept, names, "file handles", "files"),
         _counts(kept, names, "threads", "threads"),
         _lateness(kept),
-        _rate(rates),
+        *_rate_criteria(rates),
     ]
     if seconds < LEAST_JUDGED:
         slopes = [dataclasses.replace(one, outcome="undecided") for one in slopes]
@@ -231,19 +231,25 @@ def _tick_cost(begin: Sample, end: Sample) -> float:
     return (other.cpu_seconds - one.cpu_seconds) / ticks
 
 
-def _rate(stretches: Sequence[_Stretch]) -> Criterion:
-    """Return the criterion on the training rate, at the speed that the machine had in the median.
+def _rate_criteria(stretches: Sequence[_Stretch]) -> list[Criterion]:
+    """Return the criteria on the training rate: as it was, and at the machine's median speed.
 
     Where the same work costs a tenth more CPU than in the median, the machine is a tenth slower,
     and so is a training that takes all of its core.
     """
-    costs = [one.tick_cost for one in stretches]
-    usual = statistics.median(costs) if costs and min(costs) > 0.0 else 0.0
-    rates = [one.rate * (one.tick_cost / usual if usual else 1.0) for one in stretches]
-    loss = _loss([one.at for one in stretches], rates)
+    times, costs = [one.at for one in stretches], [one.tick_cost for one in stretches]
+    found = [_rate("loss of training rate", times, [one.rate for one in stretches])]
+    if costs and min(costs) > 0.0:
+        usual = statistics.median(costs)
+        rates = [one.rate * one.tick_cost / usual for one in stretches]
+        found.append(_rate("the same, at the machine's median speed", times, rates))
+    return found
+
+
+def _rate(name: str, times: Sequence[float], rates: Sequence[float]) -> Criterion:
+    loss = _loss(times, rates)
     if loss is None:
         return Criterion("training rate", "nothing was learned", "more than 0", "missed")
-    name = "loss of training rate" + (", at the machine's median speed" if usual else "")
     return Criterion(
         name, _text(loss, "an hour", percent=True), f"at most {RATE_LIMIT:.0%} an hour",
         judged(loss.low, loss.high, RATE_LIMIT),
