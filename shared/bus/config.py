@@ -24,9 +24,12 @@ MAX_NAMED = 4 * MAX_MESSAGE
 """Up to here a locked router reads a message that is too long, to say whose it was (bytes): what is
 longer the library throws away without a word."""
 
-SHARED_MEMORY_POOL = 6 * MIB
+SHARED_MEMORY_POOL = MIB
 """What one process passes to others at a time (bytes); what does not fit goes through the socket.
 Whoever gets something maps the whole pool of its sender, so it counts once in each process."""
+
+LARGER_POOLS = {"actor": 4 * MIB, "router": 6 * MIB}
+"""The same of those that send rollouts, which are 0.9 MB at the default sizes, or pass them on."""
 
 _ENDPOINT = re.compile(
     r"(?P<protocol>tcp|tls|quic)/(?P<host>\[[0-9a-fA-F:.]+\]|[^:/\[\]?#]+):[0-9]{1,5}"
@@ -170,7 +173,7 @@ def client_json(cfg: BusConfig, role: Role) -> str:
             },
         },
         "listen": {"endpoints": []},
-        **_common(cfg),
+        **_common(cfg, role),
     }  # fmt: skip
     _secure(config, cfg, role, "connect", cfg.routers)
     return json.dumps(config)
@@ -190,7 +193,7 @@ def router_json(cfg: BusConfig) -> str:
         "mode": "router",
         "connect": {"endpoints": list(cfg.connect)},
         "listen": {"endpoints": list(cfg.listen), "exit_on_failure": True, "timeout_ms": 0},
-        **_common(cfg),
+        **_common(cfg, "router"),
     }
     config["transport"]["unicast"] = {
         "max_sessions": 5000, "accept_pending": 1000, "accept_timeout": 2000,
@@ -235,7 +238,7 @@ def _is_loopback(endpoint: str) -> bool:
         return host == "localhost"
 
 
-def _common(cfg: BusConfig) -> dict[str, Any]:
+def _common(cfg: BusConfig, role: str) -> dict[str, Any]:
     return {
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "adminspace": {"enabled": False},
@@ -254,7 +257,7 @@ def _common(cfg: BusConfig) -> dict[str, Any]:
             },
             "shared_memory": {
                 "enabled": cfg.shared_memory,
-                "transport_optimization": {"pool_size": SHARED_MEMORY_POOL},
+                "transport_optimization": {"pool_size": LARGER_POOLS.get(role, SHARED_MEMORY_POOL)},
             },
         },
     }

@@ -238,7 +238,7 @@ def test_raw_junk_on_the_port_does_not_stop_the_router(
 def test_many_large_requests_can_be_held_before_any_is_answered(
     shared_router: Any, zenoh_world: Any
 ) -> None:
-    """They outgrow the 16 MiB pool of shared memory, which must not lose one."""
+    """They outgrow every pool of shared memory, which must not lose one."""
     cfg = msgspec.structs.replace(zenoh_world.cfg, inbox_messages=64, inbox_mib=256)
     zenoh_world.cfg = cfg
     actor, learner = zenoh_world.join("actor-0"), zenoh_world.join("learner-a")

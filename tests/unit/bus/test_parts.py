@@ -6,6 +6,7 @@ from typing import Any
 import msgspec
 import pytest
 
+from services.actor.config import ActorConfig
 from shared.bus.config import MAX_MESSAGE, BusConfig, client_json, router_json
 from shared.bus.keys import key_of, matches, pattern_of
 from shared.bus.latest import LatestSent, read_stamp, stamp_of
@@ -139,6 +140,17 @@ def test_nobody_is_searched_for_and_clients_listen_to_nothing() -> None:
     assert client["listen"] == {"endpoints": []}
     assert client["connect"]["endpoints"] == ["tcp/127.0.0.2:7447"]
     assert router["listen"]["endpoints"] == ["tcp/127.0.0.1:7447"]
+
+
+def test_only_those_that_send_rollouts_hold_much_memory_for_others() -> None:
+    def pool(text: str) -> int:
+        return json.loads(text)["transport"]["shared_memory"]["transport_optimization"]["pool_size"]
+
+    actor, learner = client_json(BusConfig(), "actor"), client_json(BusConfig(), "learner")
+    assert pool(learner) < pool(actor) < pool(router_json(BusConfig()))
+    sizes = ActorConfig()
+    rollout = 168 * sizes.num_envs * sizes.rollout_steps  # bytes
+    assert pool(actor) > 4 * rollout  # what a batch consists of
 
 
 def test_a_boot_in_memory_depends_only_on_the_name_and_how_often_it_joined() -> None:
