@@ -19,13 +19,16 @@ RETRY_SECONDS = 0.2
 class LeaseKeeper:
     """The claim of one actor on its work."""
 
-    def __init__(self, bus: Bus, clock: Clock, num_envs: int, timeout: float) -> None:
+    def __init__(
+        self, bus: Bus, clock: Clock, num_envs: int, rollout_steps: int, timeout: float
+    ) -> None:
         """Hold nothing yet.
 
         Args:
             bus: where the league answers.
             clock: decides when to renew.
             num_envs: bouts this actor plays in parallel.
+            rollout_steps: control steps of its rollouts.
             timeout: seconds to wait for an answer.
         """
         self.lease: Lease | None = None
@@ -34,6 +37,7 @@ class LeaseKeeper:
         self._bus = bus
         self._clock = clock
         self._num_envs = num_envs
+        self._rollout_steps = rollout_steps
         self._timeout = timeout
         self._schedule = bus.subscribe(SCHEDULE)
         self._requested: Pending[Lease] | None = None
@@ -84,8 +88,9 @@ class LeaseKeeper:
             if self._clock.now() < self._ask_at:
                 return False
             request = LeaseRequest(
-                actor=self._bus.name, boot=self._bus.boot, num_envs=self._num_envs
-            )
+                actor=self._bus.name, boot=self._bus.boot, num_envs=self._num_envs,
+                rollout_steps=self._rollout_steps,
+            )  # fmt: skip
             self._requested = self._bus.ask(LEASE, request, self._timeout)
             return True
         answer = self._requested.take()

@@ -31,8 +31,8 @@ log = structlog.get_logger()
 
 Arrays = dict[str, NDArray[Any]]
 
-UNPLAYABLE_SECONDS = 1.0
-"""Before the next request for work when a lease could not be played."""
+UNPLAYABLE_SECONDS, MOST_UNPLAYABLE_SECONDS = 1.0, 60.0
+"""Before the next request for work when a lease could not be played; twice as long each time."""
 RESULTS_WINDOW = 256
 """Result messages that may wait for the league."""
 
@@ -84,11 +84,12 @@ class Actor:
         )
         self._policies = LearningPolicies(bus, fit)
         self._frames = FrameSampler(env, clock, cfg.frame_period, cfg.frame_steps)
-        self._keeper = LeaseKeeper(bus, clock, cfg.num_envs, cfg.ask_timeout)
+        self._keeper = LeaseKeeper(bus, clock, cfg.num_envs, cfg.rollout_steps, cfg.ask_timeout)
         self._playing = ""
         """Name of the lease that collector or evaluation belong to."""
         self._collector: Collector | None = None
         self._evaluation: Evaluation | None = None
+        self._unplayable_seconds = UNPLAYABLE_SECONDS
         self._rollout_sequence = 0
         self._result_sequence = 0
         self._resume: tuple[Arrays, dict[str, Any]] | None = None
@@ -181,9 +182,11 @@ class Actor:
         except SnapshotError as error:
             self._last_error = str(error)
             log.error("lease_refused", lease=lease.lease, reason=str(error))
-            self._keeper.drop("unplayable", wait=UNPLAYABLE_SECONDS)
+            self._keeper.drop("unplayable", wait=self._unplayable_seconds)
+            self._unplayable_seconds = min(2 * self._unplayable_seconds, MOST_UNPLAYABLE_SECONDS)
             return False
         if started:
+            self._unplayable_seconds = UNPLAYABLE_SECONDS
             self._playing = lease.lease
             self._counters["leases"] += 1
         return started

@@ -114,6 +114,7 @@ class Settings(msgspec.Struct, frozen=True, kw_only=True):
             self.league,
             seed=self.train.seed,
             batch_rollouts=math.ceil(batch / per_rollout),
+            batch_samples=batch,
             points_per_reward=1.0 / self.reward.score_scale,
         )
         learner = msgspec.structs.replace(self.learner, seed=self.train.seed)

@@ -11,12 +11,22 @@ from services.league.history import RunState
 from services.league.leases import is_chunk_open
 from shared.errors import SnapshotError
 from shared.game.rules import RuleBook
-from shared.messages.league import FEATURE_DIM, BoutResults
+from shared.messages.league import FEATURE_DIM, BoutResults, LeaseRequest
 from shared.messages.training import UpdateMetrics, VersionReport
 from shared.policy.snapshot import digest_of
 
 MAX_NAME = 200
 """Characters; a longer name is nonsense and would swell the ledger."""
+
+
+def request_problem(request: LeaseRequest) -> str:
+    """Return why nobody can have asked for work like this, empty when they can."""
+    for field in ("actor", "boot"):
+        if (length := len(getattr(request, field))) > MAX_NAME:
+            return f"{field} has {length} characters; at most {MAX_NAME} are expected"
+    if request.num_envs < 1:
+        return f"num_envs is {request.num_envs}, below 1"
+    return ""
 
 
 def results_problem(state: RunState, results: BoutResults, rules: RuleBook) -> str:
@@ -75,8 +85,11 @@ def version_problem(state: RunState, report: VersionReport) -> str:
 
 
 def are_finite(metrics: UpdateMetrics) -> bool:
-    """Return whether every number of an update is one."""
-    return all(math.isfinite(value) for value in msgspec.structs.astuple(metrics))
+    """Return whether every number of an update is one, and every count one of 64 bits."""
+    return all(
+        -(2**63) <= value < 2**63 if isinstance(value, int) else math.isfinite(value)
+        for value in msgspec.structs.astuple(metrics)
+    )
 
 
 def _claim_problem(granted: LeaseGranted, results: BoutResults) -> str:

@@ -74,7 +74,10 @@ class LeagueConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     points_per_reward: float = 10.0
     """Points of the game in one unit of reward; `riposte train` fills it in from [reward]."""
     batch_rollouts: int = 4
-    """Rollouts in one update of a learner; sizes the window of the actors."""
+    """Rollouts in one update of a learner; the window of a serial run."""
+    batch_samples: int = 20480
+    """Samples in one update of a learner, or in its warm-up if that is more; sizes the window of
+    the actors."""
     lease_seconds: float = 10.0
     """A lease lapses after this long without a renewal (s)."""
     ended_lease_seconds: float = 5.0
@@ -107,6 +110,7 @@ class LeagueConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
         for name in ("antagonist_anchors", "protagonist_anchors"):
             _check_scripted(name, getattr(self, name))
         check_range("league.batch_rollouts", self.batch_rollouts, 1, 4096)
+        check_range("league.batch_samples", self.batch_samples, 1, 2**40)
         check_range("league.lease_seconds", self.lease_seconds, 0.5, 3600.0)
         check_range("league.ended_lease_seconds", self.ended_lease_seconds, 0.0, 600.0)
         for name in ("score_weights", "shaping_weights"):

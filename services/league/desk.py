@@ -127,8 +127,8 @@ class Desk:
             return self._receipt(report, reason)
         if problem := checks.version_problem(self._state, report):
             raise SnapshotError(problem)
-        self._store.put(report)
-        self._record_version(report)
+        card = self._store.put(report)
+        self._record_version(report, card.model)
         self.advance()
         return self._receipt(report)
 
@@ -145,17 +145,19 @@ class Desk:
         return LeaseStatus(
             alive=True,
             expires_in=self._cfg.lease_seconds,
-            window=leases.lease_window(self._cfg, actors, serial=self._serial),
+            window=leases.lease_window(
+                self._cfg, actors, granted.rollout_samples, serial=self._serial
+            ),
         )
 
     def lease(self, request: LeaseRequest) -> Lease:
         """Grant the work there is for an actor."""
+        if problem := checks.request_problem(request):
+            return Lease(lease="", kind="none", reason=problem)
         # Who asks has no work in hand, whatever we thought: an answer was lost, or it restarted.
         for lease in list(self._state.live_leases_of.get(request.actor, ())):
             boot = self._state.leases[lease].grant.boot
             self._end_lease(lease, "asked_again" if boot == request.boot else "restarted")
-        if request.num_envs < 1:
-            return Lease(lease="", kind="none", reason=f"num_envs is {request.num_envs}, below 1")
         granted = leases.grant(self._state, request)
         if granted is None:
             return Lease(lease="", kind="none", reason=describe(self._cfg, self._state))
@@ -187,7 +189,7 @@ class Desk:
     def _end_lease(self, lease: str, reason: LeaseEnd) -> None:
         self._journal.record(LeaseEnded(lease=lease, reason=reason))
 
-    def _record_version(self, report: VersionReport) -> None:
+    def _record_version(self, report: VersionReport, model: str) -> None:
         metrics = report.metrics
         if metrics is not None and not checks.are_finite(metrics):
             metrics = None
@@ -197,7 +199,8 @@ class Desk:
                     boot=f"{report.agent}:{report.policy_version}",
                     sequence=0,
                     what="metrics_dropped",
-                    detail=f"of version {report.policy_version} of {report.agent}: not finite",
+                    detail=f"of version {report.policy_version} of {report.agent}: not finite, "
+                    "or out of range",
                     reported_at_ns=self._journal.at_ns,
                 )
             )
@@ -209,6 +212,7 @@ class Desk:
                 snapshot=report.snapshot,
                 rollouts=report.rollouts,
                 metrics=metrics,
+                model=model,
             )
         )
         self.counters["versions"] += 1

@@ -80,6 +80,8 @@ class VersionEntered(Event, frozen=True, kw_only=True):
     """Content hash."""
     rollouts: tuple[str, ...]
     metrics: UpdateMetrics | None
+    model: str = ""
+    """Hash of the simulator model that the snapshot is made for."""
 
     @property
     def key(self) -> str:
@@ -106,6 +108,8 @@ class LeaseGranted(Event, frozen=True, kw_only=True):
     bouts: int = 0
     """How many, in an evaluation."""
     seed: int
+    rollout_samples: int = 0
+    """In one rollout of the actor; 0 where it did not say."""
 
     @property
     def key(self) -> str:

@@ -301,6 +301,7 @@ class RunState:
             stage = self.stages[event.stage]
             stage.add(record)
             stage.restarts += not event.rollouts
+        self.model = self.model or event.model
         self.versions[record.agent][event.version] = record
         if event.version > self.latest_version(record.agent):
             self.newest[record.agent] = record

@@ -16,6 +16,14 @@ from services.league.events import LeaseGranted
 from services.league.history import EvaluationRecord, RunState
 from services.league.records import StageRecord
 from shared.messages.league import Lease, LeaseRequest, LeaseSummary
+from shared.messages.wire import MAX_HEADER
+
+MOST_SAMPLES = 2**40
+"""In one rollout; more is nobody's."""
+MOST_BYTES = MAX_HEADER - 4096
+"""Of the list of leases as it travels: some 5,500 of them."""
+OVERHEAD_BYTES = 80
+"""Of a lease in it, beside its texts."""
 
 
 def lease_seed(run_seed: int, number: int) -> int:
@@ -30,15 +38,23 @@ def evaluation_seed(run_seed: int, antagonist: str, protagonist: str, first_bout
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little") >> 1
 
 
-def lease_window(cfg: LeagueConfig, actors: int, *, serial: bool) -> int:
-    """Return how many unacknowledged rollouts each of this many actors may have.
+def lease_window(cfg: LeagueConfig, actors: int, rollout_samples: int = 0, *, serial: bool) -> int:
+    """Return how many unacknowledged rollouts one of this many actors may have.
 
-    Two batches between all of them: one that is learned from, one that is played meanwhile.
-    In a serial run exactly one batch: the lag is fixed and the run reproducible.
+    Two batches between all of them, however long their rollouts: one that is learned from, one that
+    is played meanwhile. In a serial run exactly one batch: the lag is fixed and the run
+    reproducible.
+
+    Args:
+        cfg: says how long a batch is.
+        actors: that train.
+        rollout_samples: in one rollout of this actor; 0: as the run's own actors have them.
+        serial: whether the run is.
     """
     if serial:
         return cfg.batch_rollouts
-    return math.ceil(2 * cfg.batch_rollouts / max(actors, 1))
+    batches = cfg.batch_samples / rollout_samples if rollout_samples > 0 else cfg.batch_rollouts
+    return math.ceil(2 * batches / max(actors, 1))
 
 
 def grant(state: RunState, request: LeaseRequest) -> LeaseGranted | None:
@@ -60,6 +76,7 @@ def grant(state: RunState, request: LeaseRequest) -> LeaseGranted | None:
             antagonist="" if learns else stage.opponent,
             protagonist=stage.opponent if learns else "",
             seed=lease_seed(state.seed, number),
+            rollout_samples=min(max(request.num_envs * request.rollout_steps, 0), MOST_SAMPLES),
         )
     for evaluation in state.evaluations.values():
         chunk = open_chunk(state, evaluation, request.num_envs)
@@ -134,17 +151,28 @@ def lease_message(
         ),
         seed=granted.seed,
         expires_in=cfg.lease_seconds,
-        window=lease_window(cfg, state.training_leases, serial=serial),
+        window=lease_window(cfg, state.training_leases, granted.rollout_samples, serial=serial),
     )
 
 
 def summaries(state: RunState, cfg: LeagueConfig, now_ns: int) -> tuple[LeaseSummary, ...]:
-    """Return the training leases that are alive, and those that ended a moment ago."""
+    """Return the training leases that are alive, and those that ended a moment ago.
+
+    No more than one message holds: first those that are alive, then the newest of the others.
+    """
     oldest_ns = now_ns - round(cfg.ended_lease_seconds * 1e9)
     ended = itertools.takewhile(
         lambda lease: state.leases[lease].ended_at_ns > oldest_ns, reversed(state.ended_leases)
     )
-    return tuple(_summaries(state, sorted([*state.live_leases, *ended])))
+    listed: list[LeaseSummary] = []
+    room = MOST_BYTES
+    for summary in _summaries(state, itertools.chain(state.live_leases, ended)):
+        texts = summary.lease, summary.actor, summary.agent, summary.opponent, summary.boot
+        room -= OVERHEAD_BYTES + len("".join(texts).encode())
+        if room < 0:
+            break
+        listed.append(summary)
+    return tuple(sorted(listed, key=lambda summary: summary.lease))
 
 
 def _summaries(state: RunState, leases: Iterable[str]) -> Iterable[LeaseSummary]:
@@ -159,6 +187,7 @@ def _summaries(state: RunState, leases: Iterable[str]) -> Iterable[LeaseSummary]
                 stage=stage.index,
                 opponent=stage.opponent,
                 seed=granted.seed,
+                boot=granted.boot,
             )
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from shared.errors import SnapshotError
 from shared.messages.training import VersionReport
-from shared.policy.snapshot import MAX_BYTES, digest_of, unpack
+from shared.policy.snapshot import MAX_BYTES, Card, digest_of, unpack
 from shared.runtime.files import atomic_write
 
 
@@ -31,8 +31,8 @@ class SnapshotStore:
         """Return whether no snapshot was ever stored."""
         return next(self._folder.glob("*.safetensors"), None) is None
 
-    def put(self, report: VersionReport) -> None:
-        """Store a version's snapshot; one that is stored already and sound is left alone.
+    def put(self, report: VersionReport) -> Card:
+        """Store a version's snapshot and return its card; one that is stored is left alone.
 
         Raises:
             SnapshotError: the payload is not what the report says, too large, or not a snapshot
@@ -50,10 +50,11 @@ class SnapshotStore:
         path = self._path(digest)
         try:
             if path.read_bytes() == payload:
-                return
+                return card
         except OSError:
             pass  # not there, or unreadable: write it (again)
         atomic_write(path, payload)
+        return card
 
     def get(self, reference: str) -> bytes:
         """Return the snapshot of a player reference.

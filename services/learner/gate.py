@@ -11,6 +11,8 @@ from shared.bus.ranges import LARGEST
 from shared.messages.league import LeaseSummary, Stage
 from shared.messages.training import ACTION_DIM, Agent, Rollout
 
+MAX_BOOT = 200
+"""Characters; every name of a rollout has it, and a batch of names is one message."""
 _LOG_PROB_TOLERANCE = 1e-2
 _STD_RANGE = (1e-4, 100.0)
 _FARTHEST = 1e6
@@ -62,6 +64,8 @@ def check_provenance(
     """
     if not 0 <= rollout.sequence <= LARGEST:
         return _drop(f"sequence {rollout.sequence} is no count")
+    if len(rollout.boot) > MAX_BOOT:
+        return _drop(f"boot has {len(rollout.boot)} characters, at most {MAX_BOOT} are expected")
     if rollout.agent != agent:
         return _drop(f"it is for the {rollout.agent}, this learner is the {agent}'s")
     if rollout.model != model:
@@ -74,6 +78,8 @@ def check_provenance(
     lease = leases.get(rollout.lease)
     if lease is None:
         return Ruling(Decision.LATER, f"unknown bout: lease {rollout.lease} is not known here yet")
+    if lease.boot and rollout.boot != lease.boot:
+        return _drop(f"wrong boot: lease {lease.lease} is of another process of {lease.actor}")
     for field in ("actor", "agent", "stage", "opponent", "seed"):
         if (found := getattr(rollout, field)) != (wanted := getattr(lease, field)):
             what = "mixed opponents" if field == "opponent" else f"wrong {field}"

@@ -162,17 +162,22 @@ class Intake:
             request.reply(Receipt(accepted=True))
         self._committing = []
 
-    def learned_elsewhere(self, spans: Sequence[str]) -> None:
+    def learned_elsewhere(self, spans: Sequence[str]) -> Applied:
         """Never learn from these: the ledger has versions made from them that are lost here.
 
         Args:
             spans: ``boot:first-last`` of the numbers in their names.
+
+        Returns:
+            These alone.
         """
+        elsewhere = Applied()
         for span in spans:
             if (found := _SPAN.fullmatch(span)) is None or int(found[2]) > int(found[3]):
                 log.warning("span_ignored", span=clipped(span))
                 continue
-            self.applied.cover(found[1], int(found[2]), int(found[3]))
+            for record in (self.applied, elsewhere):
+                record.cover(found[1], int(found[2]), int(found[3]))
         kept: list[Held] = []
         for request, rollout in self._gathered:
             if self.applied.contains(rollout.boot, rollout.sequence):
@@ -181,6 +186,7 @@ class Intake:
             else:
                 kept.append((request, rollout))
         self._gathered = kept
+        return elsewhere
 
     def release(self, reason: str) -> None:
         """Answer the gathered rollouts: they will not be learned from."""
@@ -211,9 +217,13 @@ class Intake:
             else:
                 request.reply(Receipt(accepted=True))
             return
+        if self.samples >= HELD_BATCHES * max(self._cfg.batch_samples, self._cfg.warm_up_samples):
+            request.refuse("enough rollouts are held here", retry=True)  # for as long as it takes
+            return
         ruling = self._rule(rollout, version)
-        if ruling.decision is Decision.LEARN:
+        if ruling.decision is not Decision.LATER:
             self._first_refused_at.pop(rollout.lease, None)
+        if ruling.decision is Decision.LEARN:
             self._played.setdefault(rollout.lease, Played()).add(rollout)
             self._gathered.append((request, rollout))
         elif ruling.decision is Decision.LATER and not self._is_too_late(rollout.lease):
@@ -225,9 +235,6 @@ class Intake:
             self._drop(request, ruling.reason)
 
     def _rule(self, rollout: Rollout, version: int) -> Ruling:
-        limit = HELD_BATCHES * max(self._cfg.batch_samples, self._cfg.warm_up_samples)
-        if self.samples >= limit:
-            return Ruling(Decision.LATER, "enough rollouts are held here")
         ruling = check_provenance(rollout, self._agent, self.stage, self._leases, self._model)
         if ruling.decision is Decision.LEARN:
             ruling = check_version(rollout, version, self._oldest(version))

@@ -180,9 +180,9 @@ class Learner:
         did = False
         for report, receipt in self._reports.pump():
             did = True
-            self._intake.learned_elsewhere(receipt.learned_elsewhere)
+            elsewhere = self._intake.learned_elsewhere(receipt.learned_elsewhere)
             if not receipt.accepted:
-                self._renumber(report, receipt)
+                self._renumber(report, receipt, elsewhere)
                 continue
             # First the policy, then the room to play on: or the next rollout is a version behind.
             self._announce()
@@ -194,8 +194,12 @@ class Learner:
             raise RiposteError(f"the league refused version {self.version}: {reason}")
         return did
 
-    def _renumber(self, report: VersionReport, receipt: VersionReceipt) -> None:
-        """The ledger holds another policy under this version: go on above it."""
+    def _renumber(self, report: VersionReport, receipt: VersionReceipt, elsewhere: Applied) -> None:
+        """The ledger holds another policy under this version: go on above it.
+
+        Rollouts that it has behind others of this learner's versions it does not get once more: a
+        checkpoint that was restored, and is signed anew, was made from them.
+        """
         version = receipt.latest_version + 1
         log.warning("version_renumbered", version=report.policy_version, now=version)
         self._note(
@@ -203,8 +207,14 @@ class Learner:
             f"{self._agent} version {report.policy_version} is taken by another policy "
             f"({receipt.reason}); continued as version {version}",
         )
-        applied = self._intake.applied.to_json()  # with what was learned elsewhere
-        self._meta = msgspec.structs.replace(self._meta, policy_version=version, applied=applied)
+        rollouts = tuple(name for name in self._meta.rollouts if not _is_in(elsewhere, name))
+        self._meta = msgspec.structs.replace(
+            self._meta,
+            policy_version=version,
+            applied=self._intake.applied.to_json(),  # with what was learned elsewhere
+            rollouts=rollouts,
+            metrics=self._meta.metrics if rollouts else None,
+        )
         self._store.save(self._meta, self._optimiser.state())
         self._snapshot = self._make_snapshot()
         self._report()
@@ -386,6 +396,11 @@ class Learner:
 
     def close(self) -> None:
         """Nothing to finish: the checkpoint is written, and unanswered rollouts are sent again."""
+
+
+def _is_in(applied: Applied, name: str) -> bool:
+    boot, _, sequence = name.rpartition(":")
+    return sequence.isdecimal() and applied.contains(boot, int(sequence))
 
 
 def _bytes(snapshot: Snapshot) -> Bytes:

@@ -192,8 +192,9 @@ class Requests(Generic[In, Out]):
                 message = decode(self._service.request, payload, self._service.max_bytes)
             except MessageError as error:
                 self._host.counts.add("refused_messages")
-                log.warning("request_refused", key=self.key, reason=str(error))
-                back.refuse(Refused(str(error)))
+                reason = clipped(str(error))
+                log.warning("request_refused", key=self.key, reason=reason)
+                back.refuse(Refused(reason))
                 continue
             self._host.counts.taken(len(payload))
             return Held(self._host, self._service, self.key, message, back)
@@ -241,10 +242,10 @@ class Held(Generic[In, Out]):
             back.reply(payload)
 
     def refuse(self, reason: str, *, retry: bool = False) -> None:
-        """Answer with an error; only the first answer counts."""
+        """Answer with an error, at most its beginning; only the first answer counts."""
         back, self._back = self._back, None
         if back is not None:
-            back.refuse(Refused(reason, retry=retry))
+            back.refuse(Refused(clipped(reason), retry=retry))
 
 
 class Answer(Generic[Out]):

@@ -197,6 +197,7 @@ class _Path:
         self._end(payload)
 
     def refuse(self, refusal: Refused) -> None:
+        encode(refusal)  # what could not travel is an error here, too
         self._end(refusal)
 
     def drop(self) -> None:

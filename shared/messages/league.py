@@ -47,6 +47,8 @@ class LeaseRequest(Message, frozen=True, kw_only=True):
     actor: str
     boot: str
     num_envs: int
+    rollout_steps: int = 0
+    """Control steps of its rollouts; 0 where it does not say."""
 
 
 class Lease(Message, frozen=True, kw_only=True):
@@ -98,6 +100,8 @@ class LeaseSummary(Message, frozen=True, kw_only=True):
     stage: int
     opponent: str
     seed: int
+    boot: str = ""
+    """Of the actor's process; empty where the league does not say."""
 
 
 class Leases(Message, frozen=True, kw_only=True):

@@ -32,6 +32,7 @@ import numpy as np
 from shared.errors import MessageError
 from shared.messages.message import Array, Message
 from shared.messages.schema import DTYPES, ArrayField, Schema, schema_of
+from shared.messages.texts import clipped
 
 M = TypeVar("M", bound=Message)
 
@@ -315,4 +316,4 @@ def _check_text(schema: Schema, name: str, value: Any, error: type[ValueError]) 
 
 
 def _refusal(schema: Schema, why: str) -> MessageError:
-    return MessageError(f"{schema.message.__name__} refused: {why}")
+    return MessageError(f"{schema.message.__name__} refused: {clipped(why)}")

@@ -17,6 +17,8 @@ from shared.runtime.serve import run_id_of
 
 PAPER_ROUNDS = 6
 PHASES = ("one", "two", "all")
+SAVED = "config.toml"
+"""In a run's folder: the settings that it began with."""
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
@@ -102,7 +104,7 @@ def settings_of(found: argparse.Namespace, folder: Path) -> Settings:
         ConfigError: names the value, what was expected and where it stands.
     """
     site: Path | None = found.site
-    saved = folder / "config.toml"
+    saved = folder / SAVED
     if found.resume and saved.exists():
         if site is not None:
             raise ConfigError(f"--resume continues with {saved}; leave the site file out")
@@ -133,8 +135,8 @@ def check_folder(found: argparse.Namespace, folder: Path, settings: Settings) ->
     """Refuse to mix two runs, and to begin phase two without a pair.
 
     Raises:
-        ConfigError: there is a run and ``--resume`` is not asked for, or the other way round; or
-            the run has not come to the end of phase one.
+        ConfigError: there is a run and ``--resume`` is not asked for, or the other way round; the
+            run has not come to the end of phase one; or it was learned by other settings.
     """
     has_run = (folder / "league.sqlite").exists()
     if found.phase == "two":
@@ -145,6 +147,23 @@ def check_folder(found: argparse.Namespace, folder: Path, settings: Settings) ->
         )
     elif found.resume and not has_run:
         raise ConfigError(f"{folder} holds no run to resume; leave --resume out to start one")
+    if has_run and (folder / SAVED).exists():
+        _check_same_task(Settings.load(folder / SAVED), settings, folder)
+
+
+def _check_same_task(before: Settings, now: Settings, folder: Path) -> None:
+    """Refuse to go on with policies in another game, another simulator or other networks."""
+    names = [(section, "") for section in ("sim", "game", "action")]
+    names += [("learner", field) for field in ("hidden_dims", "activation")]
+    for section, field in names:
+        was, is_now = getattr(before, section), getattr(now, section)
+        if field:
+            was, is_now = getattr(was, field), getattr(is_now, field)
+        if was != is_now:
+            raise ConfigError(
+                f"{section}{field and f'.{field}'} cannot change when a run goes on: what {folder} "
+                f"has learned goes with what its {SAVED} says; start another run with another --out"
+            )
 
 
 def _check_pair(folder: Path, settings: Settings, *, has_run: bool) -> None:

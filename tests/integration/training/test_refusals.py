@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from services import cli
+from services.jobs.settings import Settings
 from services.league.ledger import Ledger
 from shared.runtime.files import RunLock
 from shared.runtime.logging import configure_logging
@@ -86,6 +87,24 @@ def test_a_folder_with_a_run_needs_resume(
     line = refused(capsys, "--out", str(tmp_path))
     assert "holds a run already" in line
     assert "--resume" in line
+
+
+@pytest.mark.parametrize(
+    ("override", "what"),
+    [
+        ("sim.physics_timestep=0.001", "sim"),
+        ("game.bout_steps=400", "game"),
+        ("action.offset_bound_m=0.01", "action"),
+        ("learner.hidden_dims=[8,8]", "learner.hidden_dims"),
+    ],
+)
+def test_a_run_does_not_go_on_in_another_game_or_with_other_networks(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], override: str, what: str
+) -> None:
+    Ledger(tmp_path / "league.sqlite").close()
+    (tmp_path / "config.toml").write_text(Settings.load(None).to_toml())
+    line = refused(capsys, "--out", str(tmp_path), "--resume", "--set", override)
+    assert f"{what} cannot change when a run goes on" in line
 
 
 def test_resume_needs_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

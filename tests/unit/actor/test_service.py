@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from services.actor.evaluation import Evaluation
-from services.actor.service import UNPLAYABLE_SECONDS, Actor
+from services.actor.service import MOST_UNPLAYABLE_SECONDS, UNPLAYABLE_SECONDS, Actor
 from services.learner.gate import Decision, check_contents
 from shared.game.reward import RewardConfig
 from shared.messages.league import Lease, LeaseStatus
@@ -286,6 +286,20 @@ def test_an_opponent_that_does_not_fit_makes_the_lease_unplayable(hall: Hall):
     hall.offer = TRAIN
     hall.tick(4)
     assert len(hall.requests) == 2
+    assert len(hall.arrived) > 0
+
+
+def test_an_actor_that_can_play_nothing_asks_less_and_less_often(hall: Hall):
+    """Each lease that it cannot play is two rows of the ledger."""
+    opponent = hall.store(policy(seed=9, model="x" * 64))
+    hall.train(stage=msgspec.structs.replace(STAGE, opponent=opponent))
+    for _ in range(200):
+        hall.clock.advance(UNPLAYABLE_SECONDS)
+        hall.tick(4)
+    assert 5 <= len(hall.requests) <= 12
+    hall.offer = TRAIN
+    hall.clock.advance(MOST_UNPLAYABLE_SECONDS + 0.1)
+    hall.tick(4)
     assert len(hall.arrived) > 0
 
 

@@ -2,7 +2,7 @@ import pytest
 
 from services.league.config import LeagueConfig
 from services.league.history import RunState
-from services.league.leases import LeaseTable, lease_seed, lease_window
+from services.league.leases import MOST_SAMPLES, LeaseTable, lease_seed, lease_window
 
 
 def test_lease_seeds_follow_from_run_and_number_and_do_not_repeat() -> None:
@@ -16,6 +16,15 @@ def test_lease_seeds_follow_from_run_and_number_and_do_not_repeat() -> None:
 def test_the_window_gives_all_actors_two_batches_together(actors: int, window: int) -> None:
     assert lease_window(LeagueConfig(batch_rollouts=5), actors, serial=False) == window
     assert lease_window(LeagueConfig(batch_rollouts=5), actors, serial=True) == 5
+
+
+@pytest.mark.parametrize("sizes", [[5120], [1280], [5120, 1280, 1280, 1280], [1], [7] * 50])
+def test_actors_of_any_size_have_a_batch_and_another_under_way_together(sizes: list[int]) -> None:
+    cfg = LeagueConfig(batch_samples=20480)
+    windows = [lease_window(cfg, len(sizes), size, serial=False) for size in sizes]
+    under_way = sum(size * window for size, window in zip(sizes, windows, strict=True))
+    assert under_way >= 2 * cfg.batch_samples
+    assert lease_window(cfg, 1, MOST_SAMPLES, serial=False) == 1
 
 
 def with_live(*leases: str) -> RunState:

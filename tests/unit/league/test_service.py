@@ -1,18 +1,22 @@
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
+import msgspec
 import numpy as np
 import pytest
 
-from services.league.history import RunState
+from services.league import leases
+from services.league.events import LeaseGranted
+from services.league.history import LeaseRecord, RunState
 from services.league.ledger import open_read_only
 from shared.bus.base import Refused, Subscription
 from shared.errors import LedgerError
-from shared.messages.league import Lease, Leases, SnapshotRequest
+from shared.messages.league import Lease, LeaseRequest, Leases, SnapshotRequest
 from shared.messages.message import Message
 from shared.messages.topics import LEASE, LEASES, PROGRESS, RESULTS, SCHEDULE, SNAPSHOT, VERSION
+from shared.messages.wire import encode
 from tests.unit.league.driving import (
     SAMPLES,
     SMALL,
@@ -77,6 +81,60 @@ def test_a_training_lease_names_stage_seed_and_window(match: Match) -> None:
     assert (lease.window, lease.expires_in) == (8, 10.0)
     assert match.lease("actor-1").window == 4
     assert match.renew(lease).window == 4
+
+
+def test_the_window_of_an_actor_with_short_rollouts_is_wider(match: Match) -> None:
+    match.both_start()
+    small = LeaseRequest(actor="actor-0", boot="b0", num_envs=32, rollout_steps=40)
+    lease = match.ask(LEASE, small)
+    assert lease.window == 32  # of 1280 samples: two batches of 20480
+    match.lease("actor-1")
+    assert match.renew(lease).window == 16
+
+
+@pytest.mark.parametrize("field", ["actor", "boot"])
+def test_a_name_that_would_swell_every_list_gets_no_work(match: Match, field: str) -> None:
+    match.both_start()
+    asked = {"actor": "actor-0", "boot": "b0", "num_envs": 4} | {field: "x" * 201}
+    answer = match.ask(LEASE, LeaseRequest(**asked))  # type: ignore[arg-type]
+    assert (answer.lease, answer.kind) == ("", "none")
+    assert f"{field} has 201 characters" in answer.reason
+
+
+def test_more_leases_than_a_message_holds_are_cut_with_the_ended_ones_first(
+    match: Match, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    match.both_start()
+    known = match.peer.subscribe(LEASES)
+    for number in range(3):
+        match.lease(f"actor-{number}")
+    for number in range(2):  # ends what they had
+        match.lease(f"actor-{number}")
+    size = len(encode(Leases(leases=leases.summaries(match.league.state, match.cfg, 0)))) / 5
+    monkeypatch.setattr(leases, "MOST_BYTES", round(4.4 * size))
+    match.lease("actor-3")
+    live = newest(known, match)
+    assert live is not None
+    assert [summary.lease for summary in live.leases] == [f"L{n:06d}" for n in (3, 4, 5, 6)]
+
+
+def test_the_longest_list_of_leases_can_be_sent(match: Match) -> None:
+    match.both_start()
+    granted = {
+        f"L{number:06d}": LeaseRecord(
+            grant=LeaseGranted(
+                lease=f"L{number:06d}", number=number, actor=f"actor-node{number:05d}-é",
+                boot="b" * 16, work="train", stage=0, antagonist="", protagonist="", seed=2**62,
+            ),
+            granted_at_ns=0,
+        )
+        for number in range(9_000)
+    }  # fmt: skip
+    match.league.state.leases.update(granted)
+    match.league.state.live_leases.update(dict.fromkeys(granted))
+    listed = leases.summaries(match.league.state, match.cfg, 0)
+    assert 5_000 < len(listed) < 9_000
+    assert len(encode(Leases(leases=listed))) < LEASES.max_bytes
 
 
 def test_the_window_of_a_serial_run_is_one_batch(tmp_path: Path) -> None:
@@ -155,14 +213,13 @@ def test_a_snapshot_that_is_not_what_the_report_says_is_refused(match: Match) ->
     assert "damaged" in answer.reason
 
 
-def test_metrics_that_are_not_finite_are_dropped_and_noted(match: Match) -> None:
+@pytest.mark.parametrize("odd", [{"explained_variance": math.inf}, {"samples": 2**63}])
+def test_metrics_that_are_no_numbers_to_keep_are_dropped_and_noted(
+    match: Match, odd: dict[str, Any]
+) -> None:
     match.both_start()
-    report = version_report("antagonist", 1, 0)
-    odd = type(report)(
-        **{name: getattr(report, name) for name in report.__struct_fields__}
-        | {"metrics": metrics(1, explained_variance=math.inf)}
-    )
-    assert match.ask(VERSION, odd).accepted
+    report = msgspec.structs.replace(version_report("antagonist", 1, 0), metrics=metrics(1, **odd))
+    assert match.ask(VERSION, report).accepted
     assert match.league.state.versions["antagonist"][1].metrics is None
     assert match.league.state.incidents[-1].what == "metrics_dropped"
     assert replayed(match) == match.league.state
@@ -220,12 +277,13 @@ def test_results_that_cannot_be_are_dropped_with_the_reason(
 
 
 def test_bouts_of_another_simulator_model_are_dropped(match: Match) -> None:
+    """What the policies are made for decides, not who hands bouts over first."""
     match.both_start()
     lease = match.lease()
-    match.play(lease)
     answer = match.play(lease, model="n" * 64)
     assert not answer.accepted
     assert "same [sim] section" in answer.reason
+    assert match.play(lease).accepted
 
 
 def test_results_without_a_bout_are_dropped(match: Match) -> None:
@@ -485,6 +543,4 @@ def test_a_run_without_evaluation_ends_after_its_last_stage(tmp_path: Path) -> N
 
 
 def _request() -> object:
-    from shared.messages.league import LeaseRequest
-
     return LeaseRequest(actor="actor-0", boot="b0", num_envs=1)

@@ -77,6 +77,20 @@ def test_what_the_schedule_may_yet_say_is_asked_again(changes: Any, reason: str)
     assert reason in ruling.reason
 
 
+def test_a_boot_that_the_lease_is_not_of_or_that_swells_every_record_is_dropped():
+    lease = msgspec.structs.replace(LEASE, boot="b0")
+    known = {lease.lease: lease}
+    assert check_provenance(rollout(), "antagonist", STAGE, known, MODEL).decision is Decision.LEARN
+    for leases, boot, reason in (
+        (known, "b1", "wrong boot: lease L000001 is of another process of actor-0"),
+        (LEASES, "b" * 16_000, "boot has 16000 characters"),
+    ):
+        theirs = rollout(boot=boot)
+        ruling = check_provenance(theirs, "antagonist", STAGE, leases, MODEL)
+        assert (ruling.decision, ruling.is_fault) == (Decision.DROP, True)
+        assert reason in ruling.reason
+
+
 def test_a_sequence_that_no_record_can_hold_is_dropped():
     theirs = msgspec.structs.replace(rollout(), sequence=2**63)
     ruling = check_provenance(theirs, "antagonist", STAGE, LEASES, MODEL)

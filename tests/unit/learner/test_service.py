@@ -355,6 +355,22 @@ def test_what_was_learned_elsewhere_is_never_learned_again_not_even_after_a_kill
     assert table.counters["rollouts_accepted"] == 0
 
 
+def test_what_the_ledger_has_behind_another_version_is_not_claimed_once_more(table: Table):
+    table.warm()
+    table.send()
+    request = table.report()
+    (name,) = request.message.rollouts
+    boot, _, number = name.partition(":")
+    request.reply(
+        VersionReceipt(
+            accepted=False, latest_version=7, stage=0, reason="it is another",
+            learned_elsewhere=(f"{boot}:{number}-{number}",),
+        )
+    )  # fmt: skip
+    renumbered = table.accept()
+    assert (renumbered.policy_version, renumbered.rollouts, renumbered.metrics) == (8, (), None)
+
+
 def test_whatever_a_rollout_quotes_the_learner_answers_and_lives(patient: Table):
     patient.warm()
     answer = patient.send(rollout(100, policy_version=1, actor="x" * 16_000)).take()
@@ -603,6 +619,10 @@ def test_more_rollouts_than_it_can_hold_are_asked_again(tmp_path: Path):
     held = [answer for answer in answers if answer is None]
     turned_away = [answer for answer in answers if isinstance(answer, Refused) and answer.retry]
     assert (len(held), len(turned_away)) == (4, 2)
+    table.clock.advance(UNKNOWN_LEASE_SECONDS + 0.1)  # the league is away for long: nobody's fault
+    again = table.send(rollout(25, policy_version=1)).take()
+    assert again == Refused("enough rollouts are held here", retry=True)
+    assert not table.learner.health().last_error
 
 
 def test_health_says_what_it_waits_for(table: Table):
