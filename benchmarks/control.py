@@ -236,7 +236,7 @@ def parts(gates: list[GateState]) -> tuple[dict[str, Any], ...]:
     made: list[dict[str, Any]] = []
     for begin in range(0, len(gates), step):
         part = gates[begin : begin + step]
-        answers = [gate.answer_ms for gate in part if gate.answer_ms is not None]
+        answers = answer_times(part)
         if answers:
             late = sum(gate.lateness_ms > PERIOD_MS for gate in part)
             made.append(
@@ -245,11 +245,23 @@ def parts(gates: list[GateState]) -> tuple[dict[str, Any], ...]:
     return tuple(made)
 
 
+def answer_times(gates: Sequence[GateState]) -> list[float]:
+    """Return how old the states were that each command answered, when it was sent (ms).
+
+    A tick without a command of the policy is left out; how many these are is a figure of its own.
+    """
+    return [
+        gate.answer_ms + PERIOD_MS * (gate.tick - gate.answered_tick)
+        for gate in gates
+        if gate.answer_ms is not None and gate.answered_tick is not None
+    ]
+
+
 def measurement(seen: dict[str, Any]) -> Measurement:
     """Return the figures of what was seen."""
     gates: list[GateState] = seen["gates"]
     counts: dict[str, int] = seen["counts"]
-    answers = [gate.answer_ms for gate in gates if gate.answer_ms is not None]
+    answers = answer_times(gates)
     command, bare = times(answers), times(seen["bare"]["times_ms"])
     late = times([gate.lateness_ms for gate in gates])
     due = counts["ticks"] + counts["ticks_lost"]

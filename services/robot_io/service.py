@@ -97,6 +97,7 @@ class RobotIo:
         self._began_at = now
         self._lateness_ms = 0.0
         self._answer_ms: float | None = None
+        self._answered_tick: int | None = None
         self._robot = parts.link.read(now)
         self._bat = self._robot.bat
         self._tracked = parts.tracker.read(now)
@@ -263,13 +264,14 @@ class RobotIo:
         self._counters["commands_repeated"] += command is None
         before = self._memory
         self._memory, output = self._parts.gate.step(before, inputs)
-        self._answer_ms = None
+        self._answer_ms = self._answered_tick = None
         if output.command is not None:
             self._commanded = array_of(output.command)
             self._parts.link.write(self._commanded)
             self._counters["commands_sent"] += 1
             if command is not None:
                 self._answer_ms = 1e3 * (self._clock.now() - self._began_at)
+                self._answered_tick = self._answered[PROTAGONIST]
                 self._answer.add(self._answer_ms)
         self._counters["commands_clipped"] += output.is_clipped
         self._note(before)
@@ -285,6 +287,7 @@ class RobotIo:
             is_sent=output.command is not None,
             lateness_ms=self._lateness_ms,
             answer_ms=self._answer_ms,
+            answered_tick=self._answered_tick,
             late_ticks=self._counters["ticks_late"],
         )
         self._bus.publish(GATE, state)

@@ -188,7 +188,9 @@ class GateState(Message, frozen=True, kw_only=True):
     lateness_ms: float
     """Of this tick of the loop."""
     answer_ms: float | None = None
-    """From the bat states being read to the policy's command being sent, where it was."""
+    """From this tick's states being read to the policy's command being sent, where it was."""
+    answered_tick: int | None = None
+    """Tick whose states that command answers: this one, or the one before of a slow policy."""
     late_ticks: int
     """Ticks more than one period late, since the start."""
 

@@ -267,7 +267,7 @@ GATE = Stream(
         _flag("is_sent", "a command went to the robot in this tick"),
         _flag("is_clipped", "more was asked for than the limits allow"),
         _number("lateness_ms", "ms", "of this tick of the loop"),
-        _number("answer_ms", "ms", "bat states read to the policy's command sent; NaN without one"),
+        _number("answer_ms", "ms", "tick's states read to a policy's command sent; NaN if none"),
         _count("late_ticks", "ticks over one period late, since robot_io started"),
     ),
 )  # fmt: skip

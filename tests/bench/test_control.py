@@ -3,15 +3,21 @@
 import numpy as np
 import pytest
 
-from benchmarks.control import measurement
+from benchmarks.control import answer_times, measurement
 from shared.messages.play import GateState
 
 
-def gate(tick: int, answer_ms: float | None, lateness_ms: float = 0.1) -> GateState:
+def gate(tick: int, answer_ms: float | None, behind: int = 0) -> GateState:
     return GateState(
         tick=tick, mode="armed", commanded=np.zeros(7), is_clipped=False,
-        lateness_ms=lateness_ms, answer_ms=answer_ms, late_ticks=0,
+        lateness_ms=0.1, answer_ms=answer_ms, late_ticks=0,
+        answered_tick=None if answer_ms is None else tick - behind,
     )  # fmt: skip
+
+
+def test_a_command_that_answers_the_tick_before_is_as_old_as_that_ticks_states():
+    gates = [gate(1, 2.0), gate(2, None), gate(3, 0.5, behind=1)]
+    assert answer_times(gates) == [2.0, 10.5]
 
 
 def test_late_and_lost_ticks_count_alike_and_misses_are_shown():
