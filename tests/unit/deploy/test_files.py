@@ -75,6 +75,13 @@ def test_only_processes_that_say_that_they_live_are_watched():
             assert is_watched, unit.name
 
 
+def test_the_loop_that_moves_the_robot_is_started_again_however_long_the_robot_is_off():
+    """No name service, no network: robot_io ends with the code of bad input."""
+    text = (DEPLOY / "systemd/riposte-robot-io.service").read_text()
+    assert "RestartPreventExitStatus" not in text
+    assert "StartLimitIntervalSec=0" in text
+
+
 def test_only_the_loop_that_moves_the_robot_has_real_time_priority():
     real_time = [unit.name for unit in UNITS if "CPUSchedulingPolicy=fifo" in unit.read_text()]
     assert real_time == ["riposte-robot-io.service"]

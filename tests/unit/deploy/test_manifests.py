@@ -38,6 +38,22 @@ def test_a_manifest_is_what_kubernetes_expects(document: dict[str, Any]):
     kubernetes_validate.validate(document, VERSION, strict=True)
 
 
+def test_whoever_deletes_the_job_keeps_its_volumes():
+    """With its namespace every claim in it would go."""
+    for path in KUSTOMIZATIONS:
+        assert not [name for name in documents(path)[0].get("resources", []) if "namespace" in name]
+    assert "kubectl apply -f deploy/kubernetes/namespace.yaml" in code_blocks(DEPLOY_PAGE)
+
+
+def test_another_run_has_other_folders():
+    for name, _, spec in pods():
+        for container in spec["containers"]:
+            words = container.get("args", [])
+            if "--run" in words and "--run-id" in words:
+                folder, run = (words[words.index(word) + 1] for word in ("--run", "--run-id"))
+                assert folder.startswith("/tmp/") or folder.endswith(f"/{run}"), name
+
+
 def test_a_misspelt_field_is_noticed():
     (document, *_) = (made for _, made in ALL if made["kind"] == "PodDisruptionBudget")
     wrong = {**document, "spec": {**document["spec"], "maxUnavailible": 1}}
