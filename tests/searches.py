@@ -22,8 +22,8 @@ DRAG, OFFSET = Candidate(VISCOUS, "elbow"), Candidate(BIAS, "pan")
 class Searches:
     """Makes searches of one small data set; only the losses are made up."""
 
-    def __init__(self, folder: Path) -> None:
-        self.problem = problem_of(measure(folder, np.random.default_rng(0), seconds=2.0))
+    def __init__(self, folder: Path, seconds: float = 2.0) -> None:
+        self.problem = problem_of(measure(folder, np.random.default_rng(0), seconds=seconds))
         self.base = self.fit(())
         self._fits: dict[tuple[Candidate, ...], Fit] = {}
 

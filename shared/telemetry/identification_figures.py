@@ -91,8 +91,13 @@ def residuals_by_joint(
         return drawn(figure)
 
 
-def stages_against_noise(values: Mapping[str, float], ceiling: str = "") -> str:
-    """Return how many times the noise floor each stage is off: a bar a stage, the floor at 1."""
+def stages_against_noise(values: Mapping[str, float], floor: str = "the noise floor") -> str:
+    """Return how many times the floor each stage is off: a bar a stage, the floor at 1.
+
+    Args:
+        values: by stage.
+        floor: what 1 is.
+    """
     with mpl.rc_context(STYLE):
         figure, axes = panel(2.3)
         rows = range(len(values))
@@ -110,14 +115,14 @@ def stages_against_noise(values: Mapping[str, float], ceiling: str = "") -> str:
             )  # fmt: skip
         axes.axvline(1.0, color=INK, linewidth=1.2, linestyle=(0, (3, 2)))
         axes.annotate(
-            "noise floor", (1.0, -0.62), xytext=(4, 0), textcoords="offset points", color=SOFT,
-            fontsize=9, va="bottom",
+            floor.removeprefix("the "), (1.0, -0.62), xytext=(4, 0), textcoords="offset points",
+            color=SOFT, fontsize=9, va="bottom",
         )  # fmt: skip
         _named_rows(axes, names)
         axes.set_ylim(len(values) - 0.45, -0.75)
         axes.set_xlim(0.0, 1.18 * max(1.0, float(lengths.max())))
         axes.grid(visible=False, axis="y")
-        axes.set_xlabel(ceiling or "residual on held-out motion, in units of the noise floor")
+        axes.set_xlabel(f"residual on held-out motion, in units of {floor}")
         return drawn(figure)
 
 
@@ -198,12 +203,14 @@ def residual_over_time(
 def timeline(
     lanes: Sequence[tuple[str, Floats, Floats]],
     spans: Sequence[tuple[int, float, float, str]],
+    floor: str = "the noise floor",
 ) -> str:
     """Return a lane a trajectory, dark where much is left over, with what was located marked.
 
     Args:
-        lanes: name, float64[B + 1] edges (s), float64[B] residual in units of the noise floor.
+        lanes: name, float64[B + 1] edges (s), float64[B] residual in units of the floor.
         spans: lane, begin, end (s), and a mark.
+        floor: what a residual of 1 is.
     """
     with mpl.rc_context(STYLE):
         figure, axes = panel(0.5 * len(lanes) + 1.25)
@@ -225,7 +232,7 @@ def timeline(
         if picture is not None:
             bar = figure.colorbar(picture, ax=axes, location="bottom", shrink=0.8, aspect=40)
             bar.set_ticks([0.0, np.log10(3.0), 1.0, np.log10(20.0)], labels=["1", "3", "10", "20"])
-            bar.set_label("residual of the extended model, in units of the noise floor")
+            bar.set_label(f"residual of the extended model, in units of {floor}")
             bar.outline.set_visible(False)
         return drawn(figure)
 

@@ -167,7 +167,8 @@ def _joined(columns: Sequence[Float64]) -> Float64:
 def _markdown(verdict: Verdict) -> str:
     lines = [verdict.sentence, ""]
     lines += [f"- {cause_text(cause)}" for cause in verdict.causes]
-    lines += [f"- left over: {unexplained_text(left)}" for left in verdict.unexplained]
+    left_over = (unexplained_text(left, verdict.held_out) for left in verdict.unexplained)
+    lines += [f"- left over: {text}" for text in left_over]
     lines += [
         "",
         "Solid or black: measured. Grey: nominal. Orange: base fit. Blue: extended.",

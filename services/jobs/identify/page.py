@@ -102,7 +102,7 @@ def _tiles(verdict: Verdict) -> list[tuple[Node, Node, str]]:
         tiles.append((f"1 of {count}", "causes that these data do not tell apart", "bad"))
     if verdict.unexplained:
         largest = max(left.times_noise for left in verdict.unexplained)
-        about = "the noise floor is what the largest unexplained part reaches"
+        about = f"{words.floor_name(held_out)} is what the largest unexplained part reaches"
         tiles.append((f"{words.number_text(largest, 2)}x", about, "bad"))
     tiles.append((str(len(verdict.candidates)), "candidate causes were looked at", ""))
     return tiles
@@ -173,7 +173,7 @@ def _held_out(verdict: Verdict, evidence: Evidence) -> Html:
     share = words.share_text(held_out.share_removed, held_out.share_interval)
     caption = (
         "Root-mean-square residual on trajectories that nothing was fitted to. The extension "
-        f"removes {share} of what lies between base fit and noise floor (95 %)."
+        f"removes {share} of what lies between base fit and {words.floor_name(held_out)} (95 %)."
     )
     if not verdict.causes:
         caption = "Root-mean-square residual on trajectories that nothing was fitted to."
@@ -195,7 +195,7 @@ def _held_out(verdict: Verdict, evidence: Evidence) -> Html:
             "Every trajectory",
             html.table(
                 ("trajectory", "split", *(name for _, name in stages)), each, numbers=(2, 3, 4),
-                caption="Residual in units of the noise floor.",
+                caption=f"Residual in units of {words.floor_name(held_out)}.",
             ),
         ),
     )  # fmt: skip

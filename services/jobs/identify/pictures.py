@@ -17,7 +17,7 @@ from services.jobs.identify.residuals import (
     window_of,
     worst_joint,
 )
-from services.jobs.identify.words import floor_text, unexplained_mark
+from services.jobs.identify.words import floor_name, floor_text, unexplained_mark
 from shared.identification.dataset.types import Float64
 from shared.identification.evidence import Diagnostics, Evidence
 from shared.identification.verdict import BaseValue, Scored, Verdict
@@ -57,7 +57,7 @@ def stages(verdict: Verdict) -> Picture:
         values["extended"] = held_out.extended
     best = "1 is as good as it gets" if held_out.is_floor_measured else floor_text(held_out)
     words = f"Root-mean-square residual on motion that nothing was fitted to. {best}."
-    return Picture(figures.stages_against_noise(values), words)
+    return Picture(figures.stages_against_noise(values, floor_name(held_out)), words)
 
 
 def by_joint(verdict: Verdict, evidence: Evidence) -> Picture:
@@ -68,8 +68,12 @@ def by_joint(verdict: Verdict, evidence: Evidence) -> Picture:
     svg = figures.residuals_by_joint(
         evidence.joints, finite, 1e3 * evidence.noise, _small_unit(evidence)
     )
-    floor = "repeats" if evidence.noise_from_repeats else "the residual itself, for want of repeats"
-    return Picture(svg, f"Each joint, before and after. The tick is its noise floor, from {floor}.")
+    floor = (
+        "its noise floor, from repeats"
+        if evidence.noise_from_repeats
+        else "what the base fit usually leaves there, for want of repeats"
+    )
+    return Picture(svg, f"Each joint, before and after. The tick is {floor}.")
 
 
 def shown_window(verdict: Verdict, evidence: Evidence) -> Window:
@@ -103,7 +107,7 @@ def left_over(window: Window, verdict: Verdict, evidence: Evidence) -> Picture:
     )  # fmt: skip
     words = (
         f"Measured minus predicted of {evidence.joints[index]} in {window.replay.name}, where the "
-        "base fit is furthest off; the grey band is twice the noise floor."
+        f"base fit is furthest off; the grey band is twice {floor_name(verdict.held_out)}."
     )
     return Picture(svg, words)
 
@@ -213,7 +217,7 @@ def unexplained(verdict: Verdict, evidence: Evidence) -> Picture:
     ]
     words = "What the best model leaves over, darker where more"
     words += "; letters are those of the table." if spans else "."
-    return Picture(figures.timeline(lanes, spans), words)
+    return Picture(figures.timeline(lanes, spans, floor_name(verdict.held_out)), words)
 
 
 def diagnostics(evidence: Evidence) -> list[Picture]:

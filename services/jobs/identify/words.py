@@ -92,6 +92,11 @@ def held_out_text(held_out: HeldOut) -> str:
     return text
 
 
+def floor_name(held_out: HeldOut) -> str:
+    """Return what residuals are told in units of."""
+    return "the noise floor" if held_out.is_floor_measured else "what the base fit usually leaves"
+
+
 def floor_text(held_out: HeldOut) -> str:
     """Return what 1 is."""
     if held_out.is_floor_measured:
@@ -110,13 +115,13 @@ def tie_text(tie: Tie) -> str:
     return f"{names}: alike to {number_text(tie.alike)}"
 
 
-def unexplained_text(left: Unexplained) -> str:
-    """Return in a line where something is left."""
+def unexplained_text(left: Unexplained, held_out: HeldOut) -> str:
+    """Return in a line where something is left, and how much."""
     size = quantity_text(left.size, left.unit)
     return (
         f"{left.where}, {left.trajectory} from {number_text(left.begin)} to "
         f"{number_text(left.end)} s, {when_text(left)}: {size}, "
-        f"{number_text(left.times_noise)} times the noise floor"
+        f"{number_text(left.times_noise)} times {floor_name(held_out)}"
     )
 
 
@@ -147,7 +152,8 @@ def verdict_text(verdict: Verdict, folder: Path) -> str:
     if verdict.causes:
         share = share_text(verdict.held_out.share_removed, verdict.held_out.share_interval)
         add("", [f"removes {share} of what could be explained"])
-    add("unexplained", [unexplained_text(left) for left in verdict.unexplained[:3]])
+    left = [unexplained_text(each, verdict.held_out) for each in verdict.unexplained[:3]]
+    add("unexplained", left)
     add("record next", list(verdict.record_next[:3]))
     if not verdict.starts_agree:
         add("beware", ["base fits from different starts did not meet: believe little of this"])

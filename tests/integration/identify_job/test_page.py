@@ -210,6 +210,18 @@ def test_the_page_asks_for_nothing_and_repeats_itself() -> None:
     assert len(page) < 1_000_000
 
 
+def test_a_page_without_a_measured_noise_floor_never_speaks_of_one() -> None:
+    found = example("unexplained")
+    held_out = msgspec.structs.replace(found.verdict.held_out, is_floor_measured=False)
+    verdict = msgspec.structs.replace(found.verdict, held_out=held_out)
+    evidence = replace(found.evidence, noise_from_repeats=False)
+    page = read(Example(verdict, evidence, found.carried))
+    said = (page.text + page.figures).replace("noise floor, not measured", "")
+    assert said.count("noise floor") == 1  # the name of a step, in the table of times
+    assert page.figures.count("what the base fit usually leaves") >= 3
+    assert "noise floor" in page_of("unexplained").figures
+
+
 def test_the_joints_are_those_of_the_evidence() -> None:
     page = page_of("none")
     assert all(joint in page.figures for joint in JOINTS)

@@ -1,9 +1,12 @@
 """The gate: an interval that covers, and nothing passes that is not sure and enough."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from shared.identification.gate import Gain, compare, floor_of
+from shared.identification.gate import STRETCH, Gain, compare, floor_of, stretches
+from tests.measured import measure, nominal, problem_of
 
 
 @pytest.mark.parametrize("count", [3, 8, 40])
@@ -42,6 +45,23 @@ def test_a_cause_is_useful_only_if_it_is_sure_and_enough():
     assert not gain(3.0, 2.95, 0.01).is_useful(3.0)  # 2.7 % of what can be explained
     assert not gain(3.0, 2.0, 0.5).is_useful(100.0)  # 1 % of what could be explained
     assert not gain(100.0, 99.0, 0.5).is_useful(10.0)  # 1 % of what is left
+
+
+def test_what_happened_once_is_in_one_stretch_and_in_none_where_it_is_not_counted(tmp_path: Path):
+    problem = problem_of(measure(tmp_path, np.random.default_rng(0), seconds=4.0))
+    (held_out,) = problem.of("test")
+    quiet = stretches(problem, nominal(problem), (held_out,))
+    assert len(quiet) == 4.0 / STRETCH
+    assert quiet.max() < 2.0
+    problem.segments[held_out].q[110:140] += 0.05  # rad, from 1.1 s to 1.4 s
+    struck = stretches(problem, nominal(problem), (held_out,))
+    assert struck[2] > 1000.0
+    assert np.delete(struck, 2) == pytest.approx(np.delete(quiet, 2))
+    blocks = problem.shape_of(held_out)[0]
+    problem.uncounted[held_out] = np.arange(blocks) // (blocks // 8) == 2
+    assert stretches(problem, nominal(problem), (held_out,)) == pytest.approx(np.delete(quiet, 2))
+    problem.uncounted[held_out][:] = True
+    assert len(stretches(problem, nominal(problem), (held_out,))) == 0
 
 
 def test_the_floor_is_always_below_the_base():

@@ -66,13 +66,17 @@ def test_a_floor_that_nothing_measured_is_not_called_the_noise() -> None:
     assert "1 is the noise floor" in held_out_text(measured)
     assert "noise floor" not in held_out_text(guessed)
     assert "1 is what the base fit usually leaves" in held_out_text(guessed)
+    left = example("unexplained").verdict.unexplained[0]
+    assert unexplained_text(left, measured).endswith("times the noise floor")
+    assert unexplained_text(left, guessed).endswith("times what the base fit usually leaves")
 
 
 def test_what_came_from_outside_is_called_external() -> None:
-    left = example("unexplained").verdict.unexplained[0]
+    verdict = example("unexplained").verdict
+    left = verdict.unexplained[0]
     pushed = msgspec.structs.replace(left, is_external=True)
-    assert "external" not in unexplained_text(left)
-    assert "7.7 to 8.7 s, external, once:" in unexplained_text(pushed)
+    assert "external" not in unexplained_text(left, verdict.held_out)
+    assert "7.7 to 8.7 s, external, once:" in unexplained_text(pushed, verdict.held_out)
 
 
 @pytest.mark.parametrize("word", WORDS)
