@@ -54,7 +54,7 @@ def measurement(found: Found) -> Measurement:
     """Return what was found as every benchmark says it."""
     rate = next(check for check in found.checks if check.unit == "samples/s")
     cost = found.coefficients
-    most = max((memory.actors for memory in found.memory), default=0)
+    most = max((run["actors"] for run in found.runs), default=0)
     return Measurement(
         value=rate.predicted,
         unit=f"samples/s ({rate.what}, {rate.actors} actors), predicted",

@@ -25,6 +25,7 @@ from benchmarks.training_run import ENDLESS, TrainingRun, training_run
 from services.jobs.bench import Check, Measurement
 from services.jobs.runs import state_of
 from services.jobs.settings import Settings
+from services.learner.config import LearnerConfig
 from shared.errors import RiposteError
 from shared.policy.mlp import GaussianPolicy
 from shared.policy.players import SnapshotPlayer
@@ -36,6 +37,10 @@ GOAL = 0.6
 SEEDS = 5
 PEERS = (
     Peer(name="rsl_rl's runner", module="rsl_rl_runner", num_envs=256),
+    Peer(
+        name="rsl_rl's runner, begun as ours", module="rsl_rl_runner", mode="begun-alike",
+        num_envs=256,
+    ),
     Peer(name="CleanRL's style", module="cleanrl_style", num_envs=256),
     Peer(
         name="Stable-Baselines3", module="stable_baselines3", num_envs=256,
@@ -72,7 +77,7 @@ def _race_of(training: TrainingRun, began_ns: int) -> dict[str, Any]:
         "peer": "ours",
         "wall_s": (version.at_ns - began_ns) / 1e9,
         "first_update_s": (versions[0].at_ns - began_ns) / 1e9,
-        "samples": version.metrics.total_samples,
+        "samples": version.metrics.total_samples + LearnerConfig().warm_up_samples,
         "updates": version.version,
         "skill": skill,
     }
@@ -113,7 +118,7 @@ def measure(smoke: bool) -> Measurement:
 def _add(races: list[dict[str, Any]], seed: int, race: dict[str, Any]) -> None:
     races.append(race | {"seed": seed})
     print(
-        f"seed {seed}: {race['peer']:<18} {race['wall_s']:6.1f} s, {race['samples']:>9,} samples, "
+        f"seed {seed}: {race['peer']:<30} {race['wall_s']:6.1f} s, {race['samples']:>9,} samples, "
         f"in the target {race['skill']:.3f}",
         file=sys.stderr, flush=True,
     )  # fmt: skip

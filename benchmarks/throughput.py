@@ -135,9 +135,10 @@ def bare_tcp(rounds: int, size: int) -> float:
             return rounds * size / 1e6 / (time.perf_counter() - begin)
 
 
-def answer(endpoint: str) -> None:
+def answer(endpoint: str, *, shared_memory: bool) -> None:
     """Answer everything at once, until killed: the other end of the bus."""
-    bus = open_zenoh(BusConfig(connect=(endpoint,)), "learner", SystemClock(), RUN)
+    cfg = BusConfig(connect=(endpoint,), shared_memory=shared_memory)
+    bus = open_zenoh(cfg, "learner", SystemClock(), RUN)
     leases, inbox = bus.answer(LEASE), bus.answer(ROLLOUT, agent="antagonist")
     bus.declare_alive("learner")
     while True:
@@ -180,17 +181,29 @@ class Link:
 
 
 @contextlib.contextmanager
-def linked() -> Iterator[Link]:
-    """Start router and learner, and stop them when the block ends."""
+def linked(*, shared_memory: bool = True) -> Iterator[Link]:
+    """Start router and learner, and stop them when the block ends.
+
+    Args:
+        shared_memory: pass large messages through it, as processes of one machine do; else through
+            sockets, as between machines.
+    """
+    words = () if shared_memory else ("--set", "bus.shared_memory=false")
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     with (
         tempfile.TemporaryDirectory() as folder,
-        start("--run", folder, "--listen", endpoint, module="services.router") as router,
-        start("--answer", endpoint) as learner,
+        start("--run", folder, "--listen", endpoint, *words, module="services.router") as router,
+        start("--answer", endpoint, *([] if shared_memory else ["--sockets"])) as learner,
         contextlib.closing(
-            open_zenoh(BusConfig(connect=(endpoint,)), "actor-0", SystemClock(), RUN)
+            open_zenoh(
+                BusConfig(connect=(endpoint,), shared_memory=shared_memory),
+                "actor-0",
+                SystemClock(),
+                RUN,
+                "actor",
+            )
         ) as bus,
     ):
         deadline = time.monotonic() + 20
@@ -233,7 +246,9 @@ def main() -> None:
     """Be the other end of the bus."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--answer", required=True, metavar="ENDPOINT")
-    answer(parser.parse_args().answer)
+    parser.add_argument("--sockets", action="store_true", help="no shared memory")
+    found = parser.parse_args()
+    answer(found.answer, shared_memory=not found.sockets)
 
 
 if __name__ == "__main__":

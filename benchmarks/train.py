@@ -19,10 +19,15 @@ from services.jobs.settings import Settings
 QUESTION = "training samples/s of a real run against rsl_rl's runner in one process, on two cores"
 GOAL = 1.5
 RUNNERS = tuple(
-    Peer(name="rsl_rl's runner", module="rsl_rl_runner", num_envs=num_envs, threads=threads)
-    for num_envs, threads in ((128, 1), (256, 1), (512, 1), (256, 2))
-)
-"""Worlds and torch threads that the runner may choose from."""
+    Peer(
+        name="rsl_rl's runner", module="rsl_rl_runner", num_envs=num_envs, threads=threads,
+        physics_threads=physics_threads,
+    )
+    for num_envs, threads, physics_threads in (
+        (128, 1, 1), (256, 1, 1), (512, 1, 1), (256, 2, 1), (256, 1, 2), (256, 2, 2), (512, 2, 2),
+    )
+)  # fmt: skip
+"""Worlds, threads of torch and of the physics that the runner may choose from."""
 
 
 def ours(seconds: float) -> dict[str, Any]:

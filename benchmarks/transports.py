@@ -1,8 +1,9 @@
 """Acknowledged messages of a rollout's size: our bus against a bare socket, ZeroMQ and gRPC.
 
-All between two processes over the loopback, four messages under way at a time, rounds interleaved.
-The others carry bytes and nothing else, straight from one process to the other; ours encodes,
-checks and decodes a rollout, goes through a router, and repeats what is not acknowledged.
+All between two processes of one machine, four messages under way at a time, rounds interleaved.
+The others carry bytes and nothing else over the loopback, straight from one process to the other;
+ours encodes, checks and decodes a rollout, goes through a router, and repeats what is not
+acknowledged: by way of shared memory, as it does on one machine, and over sockets, as between two.
 """
 
 import json
@@ -19,6 +20,7 @@ from shared.messages.wire import encode
 
 QUESTION = "MB/s and CPU a MB of acknowledged rollouts: our bus against TCP, ZeroMQ and gRPC"
 OTHERS = ("tcp", "zeromq", "grpc")
+KINDS = ("ours", "ours over sockets", *OTHERS)
 SHARE_OF_GRPC = 1.0
 """Ours may cost at most this times what gRPC costs, CPU a MB."""
 SECONDS = 120.0
@@ -62,20 +64,24 @@ def measure(smoke: bool) -> Measurement:
     """Return rate and CPU of all of them."""
     messages, rounds = (20, 1) if smoke else (400, 7)
     size = len(encode(a_rollout()))
-    with linked() as link:
+    with linked() as link, linked(shared_memory=False) as wired:
 
         def ours() -> dict[str, float]:
             return rollouts(link.bus, messages, link.processes)
+
+        def over_sockets() -> dict[str, float]:
+            return rollouts(wired.bus, messages, wired.processes)
 
         def other(kind: str) -> Callable[[], dict[str, float]]:
             return lambda: carried(kind, size, messages)
 
         ours()
-        turns = interleaved(rounds, [ours, *(other(kind) for kind in OTHERS)])
+        over_sockets()
+        turns = interleaved(rounds, [ours, over_sockets, *(other(kind) for kind in OTHERS)])
     runs: tuple[dict[str, Any], ...] = tuple(
         {
             f"{kind} {name}": figures[name]
-            for kind, figures in zip(("ours", *OTHERS), turn, strict=True)
+            for kind, figures in zip(KINDS, turn, strict=True)
             for name in ("mb_per_s", "cpu_ms_per_mb")
         }
         | {"ratio": turn[0]["cpu_ms_per_mb"] / turn[-1]["cpu_ms_per_mb"]}
@@ -92,7 +98,7 @@ def measure(smoke: bool) -> Measurement:
         runs=runs,
         checks=tuple(
             Check(name=f"{kind}, {what}", value=median(runs, f"{kind} {name}"), unit=unit)
-            for kind in ("ours", *OTHERS)
+            for kind in KINDS
             for what, name, unit in (
                 ("rate", "mb_per_s", "MB/s"), ("CPU a MB", "cpu_ms_per_mb", "ms"),
             )

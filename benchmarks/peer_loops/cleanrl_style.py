@@ -106,7 +106,7 @@ def loop(work: Work) -> Timing:
                 clipped = ratio.clamp(1.0 - work.clip, 1.0 + work.clip)
                 loss = (
                     -torch.min(gain * ratio, gain * clipped).mean()
-                    + work.value_loss_coef * 0.5 * (critic(o).flatten() - target).square().mean()
+                    + work.value_loss_coef * (critic(o).flatten() - target).square().mean()
                     - work.entropy_coef * normal.entropy().sum(1).mean()
                 )
                 adam.zero_grad()

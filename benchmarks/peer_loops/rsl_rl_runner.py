@@ -1,7 +1,9 @@
 """rsl_rl's own runner on the batched environment, in one process.
 
 Same networks, normalisation, epochs, minibatches, batch and learning rate as ``services/learner``;
-its own `RolloutStorage` and PPO, the bouts ours, given in whole batches.
+its own `RolloutStorage` and PPO, the bouts ours, given in whole batches. It begins as it always
+does, or, in mode `begun-alike`, as ours does: with normalisers that have learned from a rollout and
+with a policy that holds still.
 """
 # pyright: basic
 
@@ -17,6 +19,8 @@ from tensordict import TensorDict
 from benchmarks.peer_loops.work import OUTPUTS, Timing, Work, main
 from services.jobs.settings import Settings
 from services.learner.config import LearnerConfig
+
+BEGUN_ALIKE = "begun-alike"
 
 
 class BatchedBouts(VecEnv):
@@ -88,6 +92,23 @@ def runner_config(cfg: LearnerConfig, steps: int) -> dict:
     }
 
 
+def begin_alike(runner: OnPolicyRunner, env: BatchedBouts, steps: int) -> None:
+    """Make the policy's last layer small, and teach the observation normalisers a rollout."""
+    with torch.no_grad():
+        last = [layer for layer in runner.alg.actor.mlp if isinstance(layer, torch.nn.Linear)][-1]
+        last.weight.mul_(0.01)
+        last.bias.zero_()
+    seen = []
+    with torch.inference_mode():
+        for _ in range(steps):
+            obs = env.get_observations()
+            seen.append(obs["policy"])
+            env.step(runner.alg.actor(obs, stochastic_output=True))
+    together = TensorDict({"policy": torch.cat(seen)}, batch_size=[steps * env.num_envs])
+    for model in (runner.alg.actor, runner.alg.critic):
+        model.update_normalization(together)
+
+
 def loop(work: Work) -> Timing:
     """Train until the window is over."""
     torch.set_num_threads(work.threads)
@@ -104,6 +125,9 @@ def loop(work: Work) -> Timing:
             with torch.inference_mode():
                 return runner.get_inference_policy()(seen).numpy()
 
+        if work.mode == BEGUN_ALIKE:
+            begin_alike(runner, env, work.steps)
+            samples += work.steps * work.num_envs
         while True:
             runner.learn(1)
             samples += work.steps * work.num_envs

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ class Peer(msgspec.Struct, frozen=True, kw_only=True):
     mode: str = ""
     num_envs: int = 128
     threads: int = 1
+    physics_threads: int = 1
     is_distributed: bool = False
     """Whether it is held to the goal of those that spread over processes."""
 
@@ -48,7 +50,9 @@ def work_of(peer: Peer, settings: Settings, opponent: Path, seconds: float) -> W
         learning_rate=cfg.learning_rate, gamma=cfg.gamma, gae_lambda=cfg.gae_lambda,
         clip=cfg.clip, entropy_coef=cfg.entropy_coef, value_loss_coef=cfg.value_loss_coef,
         max_grad_norm=cfg.max_grad_norm, initial_std=cfg.initial_std, mode=peer.mode,
-        seconds=seconds, threads=peer.threads,
+        seconds=seconds, threads=peer.threads, physics_threads=peer.physics_threads,
+        score_weight=settings.league.score_weights[0],
+        shaping_weight=settings.league.shaping_weights[0],
     )  # fmt: skip
 
 
@@ -60,6 +64,7 @@ def run(peer: Peer, work: Work) -> dict[str, Any]:
         PeerFailedError: it did not come to its end.
     """
     python = interpreter(peer.requirements) if peer.requirements else Path(sys.executable)
+    work = msgspec.structs.replace(work, spawned_at=time.time())  # noqa: TID251
     command = [python, "-m", f"benchmarks.peer_loops.{peer.module}", msgspec.json.encode(work)]
     with (
         tempfile.TemporaryDirectory(prefix="riposte-peer-", ignore_cleanup_errors=True) as folder,
@@ -88,6 +93,7 @@ def run(peer: Peer, work: Work) -> dict[str, Any]:
         "mode": peer.mode,
         "num_envs": peer.num_envs,
         "threads": peer.threads,
+        "physics_threads": peer.physics_threads,
         "samples_per_s": timing.samples / timing.wall_s,
         "samples_per_cpu_s": timing.samples / timing.cpu_s,
     }

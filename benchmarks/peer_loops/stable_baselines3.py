@@ -95,7 +95,7 @@ def loop(work: Work) -> Timing:
         "MlpPolicy", env, learning_rate=work.learning_rate, n_steps=work.steps,
         batch_size=work.batch_samples // work.minibatches, n_epochs=work.epochs, gamma=work.gamma,
         gae_lambda=work.gae_lambda, clip_range=work.clip, ent_coef=work.entropy_coef,
-        vf_coef=work.value_loss_coef / 2, max_grad_norm=work.max_grad_norm, seed=work.seed,
+        vf_coef=work.value_loss_coef, max_grad_norm=work.max_grad_norm, seed=work.seed,
         device="cpu",
         policy_kwargs={
             "net_arch": {"pi": layers, "vf": layers}, "activation_fn": nn.Tanh,

@@ -56,8 +56,15 @@ class Work(msgspec.Struct, frozen=True, kw_only=True):
     threads: int = 1
     """Of torch, where the loop is one process."""
     seed: int = 1
+    physics_threads: int = 1
+    """Of the simulator."""
+    score_weight: float = 1.0
+    shaping_weight: float = 1.0
+    """Factors of the game score and of the continuous part in the reward."""
     skill: float = 0.0
     """Share of the steps in the target at which the loop ends; 0: at the end of the window."""
+    spawned_at: float = 0.0
+    """When its process was started (s, wall clock)."""
 
     @property
     def steps(self) -> int:
@@ -71,7 +78,10 @@ class Work(msgspec.Struct, frozen=True, kw_only=True):
             num_envs: how many; all of them by default.
             seed: of their beginnings; the work's by default.
         """
-        bouts = Bouts(Task(), "antagonist", Path(self.opponent), num_envs or self.num_envs)
+        task = Task(score_weight=self.score_weight, shaping_weight=self.shaping_weight)
+        bouts = Bouts(
+            task, "antagonist", Path(self.opponent), num_envs or self.num_envs, self.physics_threads
+        )
         return Batch(bouts, self.seed if seed is None else seed)
 
     def stopwatch(self) -> "Stopwatch":
@@ -160,7 +170,7 @@ class Stopwatch:
 
     def _age(self) -> float:
         """Return the seconds since the process was started."""
-        return time.time() - self._me.create_time()  # noqa: TID251
+        return time.time() - self._work.spawned_at  # noqa: TID251
 
     def _all(self) -> list[psutil.Process]:
         return [self._me, *self._me.children(recursive=True)]

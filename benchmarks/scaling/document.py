@@ -146,11 +146,13 @@ def crowding(found: Found) -> str:
                 f"{number(run['bytes_out_per_s'] / 1e6)} MB/s",
                 number(run["bytes_out_per_s"] / max(useful, 1.0)),
                 f"{run['learner_thread']:.2f}", f"{run['router']:.2f}",
+                number(run["samples_per_s"] / max(run["versions_per_s"], 1e-9)),
             )
         )  # fmt: skip
     head = (
         "Actors", "Samples/s learned from", "Samples/s dropped", "Sent by actors",
         "Bytes sent / learned from", "Learner's main thread, cores", "Router, cores",
+        "Samples a version",
     )  # fmt: skip
     return table(head, rows)
 

@@ -27,7 +27,7 @@ from shared.bus.ports import free_port
 from shared.clock import SystemClock
 from shared.errors import RiposteError
 
-START_SECONDS = 240.0
+START_SECONDS = 400.0
 POLL_SECONDS = 0.2
 LEARNER = "learner-antagonist"
 ROLLOUT_STEPS = 40

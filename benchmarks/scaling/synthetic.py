@@ -71,7 +71,8 @@ class SyntheticActor:
         cfg = ActorConfig()
         self.bus = bus
         self.put = self.accepted = self.dropped = self.held_back = 0
-        self.keeper = LeaseKeeper(bus, clock, rollout.rewards.shape[1], cfg.ask_timeout)
+        steps, worlds = rollout.rewards.shape
+        self.keeper = LeaseKeeper(bus, clock, worlds, steps, cfg.ask_timeout)
         self._clock = clock
         self._rollout = rollout
         self._pace = pace
@@ -174,20 +175,22 @@ def main() -> None:
     phases = np.random.default_rng(0).uniform(0.0, found.period, found.actors)
     with contextlib.ExitStack() as stack, found.out.open("ab", buffering=0) as out:
         actors: list[SyntheticActor] = []
-        for number, phase in enumerate(phases):
-            bus = open_zenoh(cfg, f"{found.name}-{number}", clock, found.run_id)
-            pace = Pace(found.period, clock.now() + float(phase))
-            actors.append(SyntheticActor(bus, clock, rollout, pace))
-            stack.callback(bus.close)
         report_at = clock.now()
         while True:
             began_at = clock.now()
+            if len(actors) < found.actors:  # one at a time, so that those that are in keep up
+                number = len(actors)
+                bus = open_zenoh(cfg, f"{found.name}-{number}", clock, found.run_id)
+                stack.callback(bus.close)
+                pace = Pace(found.period, clock.now() + float(phases[number]))
+                actors.append(SyntheticActor(bus, clock, rollout, pace))
             did = [actor.tick() for actor in actors]
             if clock.now() >= report_at:
                 report_at = clock.now() + REPORT_SECONDS
                 out.write(msgspec.json.encode(totals(actors, time.monotonic())) + b"\n")
             left = SWEEP_SECONDS - (clock.now() - began_at)
-            if left > 0 and not (found.period == 0.0 and any(did)):
+            is_complete = len(actors) == found.actors
+            if left > 0 and is_complete and not (found.period == 0.0 and any(did)):
                 time.sleep(left)
 
 

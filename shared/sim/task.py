@@ -31,7 +31,7 @@ Opponent = Player | Callable[[Float32s], Float32s] | str | Path
 
 
 class Task(msgspec.Struct, frozen=True, kw_only=True):
-    """The game to play; the defaults are those of ``riposte train``."""
+    """The game to play; the defaults are those of ``riposte train`` in phase one."""
 
     sim: SimConfig = SimConfig()
     rules: RuleBook = RuleBook()
@@ -39,7 +39,7 @@ class Task(msgspec.Struct, frozen=True, kw_only=True):
     reward: RewardConfig = RewardConfig()
     score_weight: float = 1.0
     """Factor of the scaled game score in the reward."""
-    shaping_weight: float = 1.0
+    shaping_weight: float = 0.4
     """Factor of the continuous part; 0 leaves a zero-sum game."""
 
     def worlds(self, num_envs: int, num_threads: int = 1) -> FencingEnv:

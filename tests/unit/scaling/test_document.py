@@ -29,8 +29,8 @@ KEPT: dict[str, Any] = {
             ),
             runs=(
                 {"purpose": "crowding", "actors": 9, "samples_per_s": 100.0, "dropped_per_s": 7.0,
-                 "bytes_out_per_s": 3 * 16_800.0, "learner_thread": 0.5, "router": 0.25,
-                 "league": 0.1, "rollout_samples": 5120, "batch_samples": 20480},
+                 "versions_per_s": 2.0, "bytes_out_per_s": 3 * 16_800.0, "learner_thread": 0.5,
+                 "router": 0.25, "league": 0.1, "rollout_samples": 5120, "batch_samples": 20480},
             ),
         )
     ),
