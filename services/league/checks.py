@@ -12,18 +12,16 @@ from services.league.leases import is_chunk_open
 from shared.errors import SnapshotError
 from shared.game.rules import RuleBook
 from shared.messages.league import FEATURE_DIM, BoutResults, LeaseRequest
+from shared.messages.texts import LONGEST_NAME
 from shared.messages.training import UpdateMetrics, VersionReport
 from shared.policy.snapshot import digest_of
-
-MAX_NAME = 200
-"""Characters; a longer name is nonsense and would swell the ledger."""
 
 
 def request_problem(request: LeaseRequest) -> str:
     """Return why nobody can have asked for work like this, empty when they can."""
     for field in ("actor", "boot"):
-        if (length := len(getattr(request, field))) > MAX_NAME:
-            return f"{field} has {length} characters; at most {MAX_NAME} are expected"
+        if (length := len(getattr(request, field))) > LONGEST_NAME:
+            return f"{field} has {length} characters; at most {LONGEST_NAME} are expected"
     if request.num_envs < 1:
         return f"num_envs is {request.num_envs}, below 1"
     return ""
@@ -33,7 +31,7 @@ def results_problem(state: RunState, results: BoutResults, rules: RuleBook) -> s
     """Return why these results cannot be entered, empty when they can."""
     lease = state.leases.get(results.lease)
     if lease is None:
-        return f"lease {results.lease[:MAX_NAME]!r} was never granted in this run"
+        return f"lease {results.lease[:LONGEST_NAME]!r} was never granted in this run"
     return (
         _claim_problem(lease.grant, results)
         or _player_problem(state, lease.grant, results)
@@ -93,8 +91,8 @@ def are_finite(metrics: UpdateMetrics) -> bool:
 
 
 def _claim_problem(granted: LeaseGranted, results: BoutResults) -> str:
-    if len(results.name) > MAX_NAME:
-        return f"boot has {len(results.boot)} characters; at most {MAX_NAME} are expected"
+    if len(results.name) > LONGEST_NAME:
+        return f"boot has {len(results.boot)} characters; at most {LONGEST_NAME} are expected"
     claims = {
         "actor": (results.actor, granted.actor),
         "boot": (results.boot, granted.boot),
@@ -113,7 +111,7 @@ def _player_problem(state: RunState, granted: LeaseGranted, results: BoutResults
         claimed: str = getattr(results, side)
         given: str = getattr(granted, side)
         if given and claimed != given:
-            return f"{side} is {claimed[:MAX_NAME]!r}, lease {granted.lease} says {given!r}"
+            return f"{side} is {claimed[:LONGEST_NAME]!r}, lease {granted.lease} says {given!r}"
         if not given:  # the learning side: whichever snapshot it was by then
             try:
                 digest_of(claimed)

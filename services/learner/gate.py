@@ -9,10 +9,9 @@ import numpy as np
 from services.learner.played import Played
 from shared.bus.ranges import LARGEST
 from shared.messages.league import LeaseSummary, Stage
+from shared.messages.texts import LONGEST_NAME
 from shared.messages.training import ACTION_DIM, Agent, Rollout
 
-MAX_BOOT = 200
-"""Characters; every name of a rollout has it, and a batch of names is one message."""
 _LOG_PROB_TOLERANCE = 1e-2
 _STD_RANGE = (1e-4, 100.0)
 _FARTHEST = 1e6
@@ -64,8 +63,10 @@ def check_provenance(
     """
     if not 0 <= rollout.sequence <= LARGEST:
         return _drop(f"sequence {rollout.sequence} is no count")
-    if len(rollout.boot) > MAX_BOOT:
-        return _drop(f"boot has {len(rollout.boot)} characters, at most {MAX_BOOT} are expected")
+    if len(rollout.boot) > LONGEST_NAME:
+        return _drop(
+            f"boot has {len(rollout.boot)} characters, at most {LONGEST_NAME} are expected"
+        )
     if rollout.agent != agent:
         return _drop(f"it is for the {rollout.agent}, this learner is the {agent}'s")
     if rollout.model != model:

@@ -23,18 +23,17 @@ from shared.bus.base import Bus
 from shared.bus.delivery import Applied, Outbox
 from shared.clock import Clock
 from shared.errors import RiposteError
-from shared.messages.league import Incident
 from shared.messages.message import Bytes
-from shared.messages.topics import INCIDENT, LEASES, POLICY, ROLLOUT, SCHEDULE, VERSION
+from shared.messages.topics import LEASES, POLICY, ROLLOUT, SCHEDULE, VERSION
 from shared.messages.training import (
     Agent,
     PolicyAnnouncement,
-    Receipt,
     UpdateMetrics,
     VersionReceipt,
     VersionReport,
 )
 from shared.policy.snapshot import Snapshot
+from shared.runtime.incidents import Incidents
 from shared.runtime.rate import Rate
 from shared.runtime.service import Health
 
@@ -91,10 +90,7 @@ class Learner:
         self._reports: Outbox[VersionReport, VersionReceipt] = Outbox(
             bus, VERSION, clock, window=1, timeout=REPORT_TIMEOUT
         )
-        self._incidents: Outbox[Incident, Receipt] = Outbox(
-            bus, INCIDENT, clock, window=64, timeout=REPORT_TIMEOUT
-        )
-        self._incident_sequence = 0
+        self._incidents = Incidents(bus, clock, window=64, most=MAX_INCIDENTS)
         self._total_samples = 0
         self._announced = False
         self._waiting_since = clock.now()
@@ -131,7 +127,7 @@ class Learner:
             return meta
         for fault in faults:
             self._last_error = fault
-            self._note(
+            self._incidents.note(
                 "checkpoint_corrupt", f"{fault}; continued from version {meta.policy_version}"
             )
         self._optimiser.restore(tensors)
@@ -155,7 +151,7 @@ class Learner:
         did |= self._intake.take(self.version, entering)
         while self._intake.faults:
             self._last_error = self._intake.faults.popleft()
-            self._note("rollout_refused", self._last_error)
+            self._incidents.note("rollout_refused", self._last_error)
         if self._announced and self._intake.samples >= self._intake.needed(self.version):
             self._update()
             did = True
@@ -202,12 +198,12 @@ class Learner:
         """
         version = receipt.latest_version + 1
         log.warning("version_renumbered", version=report.policy_version, now=version)
-        self._note(
+        self._incidents.note(
             "version_renumbered",
             f"{self._agent} version {report.policy_version} is taken by another policy "
             f"({receipt.reason}); continued as version {version}",
         )
-        rollouts = tuple(name for name in self._meta.rollouts if not _is_in(elsewhere, name))
+        rollouts = tuple(name for name in self._meta.rollouts if not elsewhere.contains_name(name))
         self._meta = msgspec.structs.replace(
             self._meta,
             policy_version=version,
@@ -351,22 +347,6 @@ class Learner:
 
     # -- how it is --------------------------------------------------------------------------
 
-    def _note(self, kind: str, detail: str) -> None:
-        """Tell the report of something worth a line."""
-        if self._incidents.full or self._incident_sequence >= MAX_INCIDENTS:
-            return
-        self._incidents.put(
-            Incident(
-                source=self._bus.name,
-                boot=self._bus.boot,
-                sequence=self._incident_sequence,
-                kind=kind,
-                detail=detail,
-                at_ns=self._clock.wall_ns(),
-            )
-        )
-        self._incident_sequence += 1
-
     def health(self) -> Health:
         """Return how this learner is."""
         waiting = ""
@@ -396,11 +376,6 @@ class Learner:
 
     def close(self) -> None:
         """Nothing to finish: the checkpoint is written, and unanswered rollouts are sent again."""
-
-
-def _is_in(applied: Applied, name: str) -> bool:
-    boot, _, sequence = name.rpartition(":")
-    return sequence.isdecimal() and applied.contains(boot, int(sequence))
 
 
 def _bytes(snapshot: Snapshot) -> Bytes:

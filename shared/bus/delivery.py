@@ -160,6 +160,11 @@ class Applied:
         ranges = self._boots.get(boot)
         return ranges is not None and sequence in ranges
 
+    def contains_name(self, name: str) -> bool:
+        """Return whether the message ``boot:sequence`` has been applied."""
+        boot, _, sequence = name.rpartition(":")
+        return sequence.isdecimal() and self.contains(boot, int(sequence))
+
     def add(self, boot: str, sequence: int) -> None:
         """Enter a message; entering it again changes nothing."""
         ranges = self._boots.pop(boot, None) or Ranges()

@@ -1,9 +1,12 @@
-"""What a process knows of itself; Linux."""
+"""What a process knows of itself and does with its children; Linux."""
 
 import ctypes
 import dataclasses
 import resource
+import subprocess
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 PR_SET_NAME = 15
 
@@ -43,6 +46,27 @@ def release_memory() -> None:
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)
+
+
+def end(children: Iterable["subprocess.Popen[Any]"], seconds: float) -> None:
+    """Terminate child processes, in their order, and kill what has not ended after a while.
+
+    Args:
+        children: some may have ended already.
+        seconds: that each has, and then the kernel (s).
+
+    Raises:
+        subprocess.TimeoutExpired: the kernel does not let go of one that was killed.
+    """
+    ended = list(children)
+    for process in ended:
+        process.terminate()
+    for process in ended:
+        try:
+            process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait(seconds)
 
 
 def set_process_name(name: str) -> None:

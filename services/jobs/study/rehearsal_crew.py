@@ -15,6 +15,7 @@ import msgspec
 import services
 from shared.errors import RiposteError
 from shared.runtime.build import SOURCE_ROOT
+from shared.runtime.process import end
 from shared.study.allocation import participant_name
 from shared.study.folder import Study
 from shared.study.journal import FILE
@@ -130,14 +131,7 @@ class Crew:
                 )
 
     def _stop(self) -> None:
-        for process in self._running.values():
-            process.terminate()
-        for process in self._running.values():
-            try:
-                process.wait(END_SECONDS)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+        end(self._running.values(), END_SECONDS)
         for file in self._said.values():
             file.close()
 

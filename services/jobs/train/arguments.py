@@ -2,6 +2,7 @@
 
 import argparse
 import datetime
+import operator
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -153,15 +154,11 @@ def check_folder(found: argparse.Namespace, folder: Path, settings: Settings) ->
 
 def _check_same_task(before: Settings, now: Settings, folder: Path) -> None:
     """Refuse to go on with policies in another game, another simulator or other networks."""
-    names = [(section, "") for section in ("sim", "game", "action")]
-    names += [("learner", field) for field in ("hidden_dims", "activation")]
-    for section, field in names:
-        was, is_now = getattr(before, section), getattr(now, section)
-        if field:
-            was, is_now = getattr(was, field), getattr(is_now, field)
-        if was != is_now:
+    for name in ("sim", "game", "action", "learner.hidden_dims", "learner.activation"):
+        value = operator.attrgetter(name)
+        if value(before) != value(now):
             raise ConfigError(
-                f"{section}{field and f'.{field}'} cannot change when a run goes on: what {folder} "
+                f"{name} cannot change when a run goes on: what {folder} "
                 f"has learned goes with what its {SAVED} says; start another run with another --out"
             )
 

@@ -17,13 +17,11 @@ from services.jobs.status import Endpoint, write_endpoint
 from services.supervisor import ProcessEvent, ProcessSpec, Supervisor
 from shared.bus.base import Bus
 from shared.bus.config import BusConfig
-from shared.bus.delivery import Outbox
 from shared.bus.ports import free_port
 from shared.clock import Clock, SystemClock
 from shared.errors import ConfigError, RiposteError
-from shared.messages.league import Incident
-from shared.messages.topics import INCIDENT, SCHEDULE
-from shared.messages.training import Receipt
+from shared.messages.topics import SCHEDULE
+from shared.runtime.incidents import Incidents
 from shared.telemetry.door import read_live_view
 
 log = structlog.get_logger()
@@ -186,10 +184,7 @@ class _Watcher:
         self._again = again
         self._space_due_at = clock.now()
         self._schedule = bus.subscribe(SCHEDULE)
-        self._incidents: Outbox[Incident, Receipt] = Outbox(
-            bus, INCIDENT, clock, window=256, timeout=5.0
-        )
-        self._sequence = 0
+        self._incidents = Incidents(bus, clock, window=256)
         self.finished = False
 
     def tick(self) -> None:
@@ -222,7 +217,7 @@ class _Watcher:
                 exit_code=event.exit_code,
             )  # fmt: skip
             if event.kind in ("died", "restarted", "gave_up"):
-                self._note(event)
+                self._incidents.note(f"process_{event.kind}", event.describe[:2000])
                 self._display.say(event.describe)
             if event.kind == "gave_up":
                 self._check_space()
@@ -235,18 +230,3 @@ class _Watcher:
                 f"no space left: {self._folder} has {free / (1 << 20):.1f} MiB free; nothing that "
                 f"was entered is lost, free some and continue with: {self._again}"
             )
-
-    def _note(self, event: ProcessEvent) -> None:
-        if self._incidents.full:
-            return
-        self._incidents.put(
-            Incident(
-                source=self._bus.name,
-                boot=self._bus.boot,
-                sequence=self._sequence,
-                kind=f"process_{event.kind}",
-                detail=event.describe[:2000],
-                at_ns=self._clock.wall_ns(),
-            )
-        )
-        self._sequence += 1

@@ -13,8 +13,10 @@ from pathlib import Path
 from typing import Self
 
 from shared.bus.ports import free_port
+from shared.runtime.process import end
 
 PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "scontrol", "squeue", "scancel")
+PATHS = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
 START_SECONDS = 60.0
 CONFIGURATION = """
 ClusterName=here
@@ -44,8 +46,7 @@ PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE
 
 def unavailable() -> str:
     """Return why no cluster can be made here; empty when one can."""
-    paths = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
-    missing = [name for name in PROGRAMS if shutil.which(name, path=paths) is None]
+    missing = [name for name in PROGRAMS if shutil.which(name, path=PATHS) is None]
     if missing:
         return f"needs {', '.join(missing)}: apt install slurm-wlm munge"
     return "" if os.geteuid() == 0 else "slurmd needs root"
@@ -67,8 +68,7 @@ class Slurm:
             control=free_port(), node=free_port(),
         )  # fmt: skip
         (folder / "slurm.conf").write_text(made)
-        paths = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
-        self._environment = os.environ | {"SLURM_CONF": str(folder / "slurm.conf"), "PATH": paths}
+        self._environment = os.environ | {"SLURM_CONF": str(folder / "slurm.conf"), "PATH": PATHS}
         self._daemons: list[subprocess.Popen[bytes]] = []
 
     def __enter__(self) -> Self:
@@ -87,14 +87,7 @@ class Slurm:
         if len(self._daemons) == 3:
             self._ask("scancel", "--quiet", f"--user={getpass.getuser()}")
             self._ask("scancel", "--quiet", "--signal=KILL", f"--user={getpass.getuser()}")
-        for process in reversed(self._daemons):
-            process.terminate()
-        for process in self._daemons:
-            try:
-                process.wait(20)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+        end(reversed(self._daemons), 20.0)
 
     def _start(self, program: str, *words: str) -> None:
         with (self.folder / f"{program}.out").open("wb") as output:

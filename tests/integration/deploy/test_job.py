@@ -16,6 +16,7 @@ import pytest
 
 from services.metrics.families import FAMILIES
 from shared.bus.ports import free_port
+from shared.runtime.process import end
 from shared.runtime.serve import EXIT_BUS_LOST
 from tests.integration.small import SMALL
 from tests.unit.deploy.found import DEPLOY, KUBERNETES, OWN_IMAGES, ROOT, compose, filled, pods
@@ -117,14 +118,7 @@ class Job:
             return b""
 
     def close(self) -> None:
-        for process in reversed(self.processes.values()):
-            process.terminate()
-        for process in self.processes.values():
-            try:
-                process.wait(30)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+        end(reversed(self.processes.values()), 30.0)
 
 
 @pytest.fixture(params=[of_compose, of_kubernetes], ids=["compose", "kubernetes"])

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from shared.runtime.process import end
 from tests.integration.deploy.slurm import Slurm, unavailable
 from tests.integration.hosts.cluster import until
 from tests.integration.small import SMALL
@@ -82,14 +83,7 @@ class Site:
         return sorted(self._scratch.glob("riposte-actor-*"))
 
     def close(self) -> None:
-        for process in reversed(self._processes):
-            process.terminate()
-        for process in self._processes:
-            try:
-                process.wait(30)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+        end(reversed(self._processes), 30.0)
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from shared.bus.ports import free_port
+from shared.runtime.process import end
 from tests.unit.deploy.found import DEPLOY, documents
 
 START_SECONDS = 60.0
@@ -59,12 +60,7 @@ class Prometheus:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._process.terminate()
-        try:
-            self._process.wait(30)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        end([self._process], 30.0)
 
     def _ready(self) -> bool:
         try:

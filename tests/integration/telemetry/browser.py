@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from shared.clock import Clock
+from shared.runtime.process import end
 
 FLAGS = (
     "--headless=new",
@@ -120,12 +121,7 @@ class Browser:
         return image
 
     def close(self) -> None:
-        self._process.terminate()
-        try:
-            self._process.wait(5.0)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait(5.0)
+        end([self._process], 5.0)
         os.close(self._to)
         os.close(self._from)
 

@@ -163,6 +163,13 @@ def test_applied_equals_a_set_of_names_and_survives_json(names: list[tuple[str, 
     assert back.to_json() == applied.to_json()
 
 
+def test_applied_knows_messages_by_name() -> None:
+    applied = Applied()
+    applied.add("host:1", 7)
+    assert applied.contains_name("host:1:7")
+    assert not any(map(applied.contains_name, ("host:1:8", "1:7", "host:1:", "host:1:-7", "")))
+
+
 def test_applied_is_bounded_and_forgets_only_the_oldest() -> None:
     applied = Applied(max_boots=2, max_ranges=3)
     for sequence in range(0, 100, 2):

@@ -8,11 +8,10 @@ from pathlib import Path
 import pytest
 
 from tests.unit.deploy.found import DEPLOY, documents
-from tests.unit.deploy.test_monitoring import EXPORTED, LABELS, rules
+from tests.unit.deploy.test_monitoring import EXPORTED, LABELS, RECORDED, rules
 
 EXAMPLES = Path(__file__).with_name("rules_test.yml")
 ALERTS = {rule["alert"] for rule in rules() if "alert" in rule}
-RECORDED = {rule["record"] for rule in rules() if "record" in rule}
 
 needs_promtool = pytest.mark.skipif(
     shutil.which("promtool") is None, reason="needs promtool: apt install prometheus"
