@@ -244,7 +244,7 @@ def _common(cfg: BusConfig, role: str) -> dict[str, Any]:
         "adminspace": {"enabled": False},
         "transport": {
             "link": {
-                "rx": {"max_message_size": MAX_MESSAGE, "buffer_size": 4 * MIB},
+                "rx": {"max_message_size": MAX_MESSAGE},
                 "tx": {
                     "lease": round(cfg.lease_seconds * 1000),
                     "queue": {

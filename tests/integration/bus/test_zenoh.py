@@ -14,6 +14,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
+import psutil
 import pytest
 import zenoh
 
@@ -326,6 +327,22 @@ def test_a_bad_endpoint_is_one_line_and_exit_code_2(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "listen has 'localhost', expected an endpoint such as tcp/127.0.0.1:7447" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_router_holds_no_memory_for_those_who_left(own_router: Any) -> None:
+    resident = []
+    for turn in range(5):
+        with contextlib.ExitStack() as stack:
+            for number in range(40):
+                bus = open_zenoh(
+                    BusConfig(connect=(own_router.endpoint,)), f"a-{number}", SystemClock(), "run"
+                )
+                stack.callback(bus.close)
+                bus.subscribe(SCHEDULE)
+                bus.declare_alive("actor")
+        if turn > 1:  # before, the library makes its threads
+            resident.append(psutil.Process(own_router.process.pid).memory_info().rss / 1e6)
+    assert resident[-1] - resident[0] < 10.0, resident  # it was 1 to 8 MB for each of 80
 
 
 def test_a_router_ends_in_order_when_it_is_told_to(own_router: Any) -> None:
