@@ -50,12 +50,16 @@ def conditions(kept: dict[str, Any]) -> str:
     left_out = f" Not brought to work in time: {'; '.join(skipped)}." if skipped else ""
     quiet = "quiet" if machine["quiet"] else "busy with other work: **to be measured again**"
     error = f"{kept['ratio']:.0%}"
+    slowest, fastest = kept["details"]["speeds"]
     return (
         f"Measured with `python -m benchmarks.scale --plan {kept['plan']} --write`, commit "
         f"{kept['commit']}, on {machine['cores']} cores of an {machine['name']}, Python "
         f"{machine['python']}, in {kept['wall_s'] / 60:.0f} minutes, load average "
         f"{machine['load_before'][0]:.1f} before and {machine['load_after'][0]:.1f} after; the "
-        f"machine was {quiet}. Median error of all predictions below: {error}.{left_out}"
+        f"machine was {quiet}. Its cores' speed, which others on the same hardware change, was "
+        f"between {slowest:.2f} and {fastest:.2f} of the usual (a run each); coefficients are at "
+        "the usual speed, predictions beside a run at that run's. Median error of all predictions "
+        f"below: {error}.{left_out}"
     )
 
 

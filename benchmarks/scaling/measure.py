@@ -26,6 +26,7 @@ from benchmarks.scaling.site import (
     scaling_site,
 )
 from benchmarks.slopes import slope
+from benchmarks.speed import pieces_timed
 from benchmarks.training_run import ENDLESS, WARM_VERSION, training_run
 from shared.bus.config import BusConfig
 from shared.bus.zenoh import open_zenoh
@@ -33,6 +34,9 @@ from shared.clock import SystemClock
 from shared.errors import RiposteError
 from shared.messages.topics import LEASES, POLICY, SCHEDULE
 from shared.messages.wire import encode
+
+CPU_FIGURES = ("router", "league", "learner_thread", "learner_threads")
+"""Of a run, CPU seconds a second: what coefficients are made from."""
 
 
 class Check(msgspec.Struct, frozen=True, kw_only=True):
@@ -77,6 +81,8 @@ class Found(msgspec.Struct, frozen=True, kw_only=True):
     """Of real actors, as ``TrainingRun.window`` returned them, with ``actors``."""
     skipped: tuple[str, ...] = ()
     """Crowds that this machine did not bring to work in time, and why."""
+    speeds: tuple[float, float] = (1.0, 1.0)
+    """The slowest and the fastest that the cores were in a run, 1 being the median of the runs."""
 
     @property
     def error(self) -> float:
@@ -115,7 +121,9 @@ def play(site: ScalingSite, step: Step, plan: Plan) -> dict[str, Any]:
     """Put one crowd on a site and return what was seen of it."""
     purpose, crowd = step
     site.populate(crowd)
-    seen = site.watch(plan.seconds) | {"purpose": purpose}
+    with pieces_timed() as pieces:
+        seen = site.watch(plan.seconds) | {"purpose": purpose}
+    seen["piece_s"] = statistics.median(pieces)
     grown = watch_memory(site, plan.memory_seconds) if purpose == "memory" else []
     return seen | {"memory": [msgspec.to_builtins(one) for one in grown]} | message_sizes(site)
 
@@ -188,7 +196,9 @@ def real_run(actors: int, plan: Plan) -> dict[str, Any]:
     )  # fmt: skip
     with training_run(words) as run:
         run.wait_for_version(WARM_VERSION, deadline=2 * START_SECONDS)
-        return run.window(plan.seconds) | {"actors": actors}
+        with pieces_timed() as pieces:
+            window = run.window(plan.seconds)
+        return window | {"actors": actors, "piece_s": statistics.median(pieces)}
 
 
 def synthetic_checks(found: Coefficients, run: dict[str, Any], cores: int) -> list[Check]:
@@ -262,25 +272,49 @@ def measure(plan: Plan, cores: int, kept: KeptRuns) -> Found:
         if seen is not None:
             real.append(seen)
             kept.say(f"{actors} real actors: {seen['samples_per_s']:,.0f} samples/s")
-    cost = coefficients_of(fitted, parts)
+    usual = statistics.median(one["piece_s"] for one in (parts, *runs, *real))
+    cost = coefficients_of([at_usual_speed(run, usual) for run in fitted], parts, usual)
     checks: list[Check] = []
     for run in runs:
         if run["purpose"] in ("check", "memory"):
-            checks += synthetic_checks(cost, run, cores)
+            checks += synthetic_checks(cost.slowed(run["piece_s"] / usual), run, cores)
     for run in real:
-        checks += real_checks(cost, run, cores)
+        checks += real_checks(cost.slowed(run["piece_s"] / usual), run, cores)
     memory = [msgspec.convert(one, Memory) for run in runs for one in run["memory"]]
     return Found(
         coefficients=cost, cores=cores, checks=tuple(checks), memory=tuple(memory),
         runs=tuple(runs), real=tuple(real), skipped=tuple(kept.skipped),
+        speeds=(
+            usual / max(one["piece_s"] for one in (parts, *runs, *real)),
+            usual / min(one["piece_s"] for one in (parts, *runs, *real)),
+        ),
     )  # fmt: skip
 
 
-def coefficients_of(fitted: list[dict[str, Any]], parts: dict[str, Any]) -> Coefficients:
-    """Return the coefficients that runs without PPO, and its cost and an actor's, give."""
+def at_usual_speed(run: dict[str, Any], usual: float) -> dict[str, Any]:
+    """Return a run with the CPU seconds it would have used on cores of the usual speed.
+
+    Args:
+        run: of synthetic actors.
+        usual: CPU seconds of a piece of work there.
+    """
+    return run | {name: run[name] * usual / run["piece_s"] for name in CPU_FIGURES}
+
+
+def coefficients_of(
+    fitted: list[dict[str, Any]], parts: dict[str, Any], usual: float
+) -> Coefficients:
+    """Return the coefficients that runs without PPO, and its cost and an actor's, give.
+
+    Args:
+        fitted: runs at the usual speed.
+        parts: what an actor and PPO cost alone, at a speed of their own.
+        usual: CPU seconds of a piece of work at the usual speed.
+    """
     most = max(fitted, key=lambda run: run["actors"])
+    slower = parts["piece_s"] / usual
     return fit(
-        fitted, actor_s=parts["actor_s"], rollout_bytes=most["sample_bytes"],
-        update_s=parts["update_s"], schedule_bytes=most["schedule_bytes"],
+        fitted, actor_s=parts["actor_s"] / slower, rollout_bytes=most["sample_bytes"],
+        update_s=parts["update_s"] / slower, schedule_bytes=most["schedule_bytes"],
         lease_bytes=most["lease_bytes"], policy_bytes=most["policy_bytes"],
     )  # fmt: skip

@@ -76,6 +76,13 @@ class Coefficients(msgspec.Struct, frozen=True, kw_only=True):
     learner_bytes_per_actor: float
     """Resident memory of a learner for each actor, held rollouts aside."""
 
+    def slowed(self, factor: float) -> "Coefficients":
+        """Return what they are where everything takes so many times the CPU seconds."""
+        times = [name for name in self.__struct_fields__ if name.endswith("_s")]
+        return msgspec.structs.replace(
+            self, **{name: factor * getattr(self, name) for name in times}
+        )
+
 
 @dataclasses.dataclass(frozen=True)
 class Job:

@@ -8,6 +8,7 @@ import numpy as np
 from benchmarks.actor import Loop
 from benchmarks.harness import cpu_of
 from benchmarks.rollouts import rollout_of
+from benchmarks.speed import piece_seconds
 from services.learner.config import LearnerConfig
 
 NUM_ENVS = 128
@@ -16,7 +17,7 @@ BATCH = 4
 
 
 def costs(rounds: int) -> dict[str, float]:
-    """Return the CPU seconds for a sample of an actor's loop and of PPO, medians of rounds.
+    """Return CPU seconds, medians of rounds: an actor's for a sample, PPO's, a piece of work's.
 
     Args:
         rounds: rollouts played, each followed by an update from the newest four.
@@ -30,7 +31,9 @@ def costs(rounds: int) -> dict[str, float]:
     rollouts = []
     playing: list[float] = []
     updating: list[float] = []
+    pieces: list[float] = []
     while len(updating) < rounds:
+        pieces.append(piece_seconds())
         playing.append(cpu_of(loop.play))
         rollouts.append(rollout_of(loop.segment, loop.policy, loop.model.hash))
         if len(rollouts) >= BATCH:
@@ -41,4 +44,5 @@ def costs(rounds: int) -> dict[str, float]:
     return {
         "actor_s": statistics.median(playing) / samples,
         "update_s": statistics.median(updating) / (BATCH * samples),
+        "piece_s": statistics.median(pieces),
     }
