@@ -22,6 +22,7 @@ import psutil
 
 from benchmarks.harness import ROOT
 from shared.bus.config import BusConfig
+from shared.bus.ports import free_port
 from shared.bus.zenoh import ZenohBus, open_zenoh
 from shared.clock import SystemClock
 from shared.messages.league import Lease, LeaseRequest
@@ -135,10 +136,9 @@ def bare_tcp(rounds: int, size: int) -> float:
             return rounds * size / 1e6 / (time.perf_counter() - begin)
 
 
-def answer(endpoint: str, *, shared_memory: bool) -> None:
+def answer(cfg: BusConfig) -> None:
     """Answer everything at once, until killed: the other end of the bus."""
-    cfg = BusConfig(connect=(endpoint,), shared_memory=shared_memory)
-    bus = open_zenoh(cfg, "learner", SystemClock(), RUN)
+    bus = open_zenoh(cfg, "learner", SystemClock(), RUN, "learner")
     leases, inbox = bus.answer(LEASE), bus.answer(ROLLOUT, agent="antagonist")
     bus.declare_alive("learner")
     while True:
@@ -181,24 +181,29 @@ class Link:
 
 
 @contextlib.contextmanager
-def linked(*, shared_memory: bool = True) -> Iterator[Link]:
+def linked(*, shared_memory: bool = True, certificates: str = "") -> Iterator[Link]:
     """Start router and learner, and stop them when the block ends.
 
     Args:
         shared_memory: pass large messages through it, as processes of one machine do; else through
             sockets, as between machines.
+        certificates: folder of them: over mutual TLS, each with the rights of its role; in the
+            clear without one.
     """
     words = () if shared_memory else ("--set", "bus.shared_memory=false")
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    ends = () if shared_memory else ("--sockets",)
+    if certificates:
+        words, ends = ((*some, "--certificates", certificates) for some in (words, ends))
+    endpoint = f"{'tls' if certificates else 'tcp'}/127.0.0.1:{free_port()}"
     with (
         tempfile.TemporaryDirectory() as folder,
         start("--run", folder, "--listen", endpoint, *words, module="services.router") as router,
-        start("--answer", endpoint, *([] if shared_memory else ["--sockets"])) as learner,
+        start("--answer", endpoint, *ends) as learner,
         contextlib.closing(
             open_zenoh(
-                BusConfig(connect=(endpoint,), shared_memory=shared_memory),
+                BusConfig(
+                    connect=(endpoint,), shared_memory=shared_memory, certificates=certificates
+                ),
                 "actor-0",
                 SystemClock(),
                 RUN,
@@ -247,8 +252,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--answer", required=True, metavar="ENDPOINT")
     parser.add_argument("--sockets", action="store_true", help="no shared memory")
+    parser.add_argument("--certificates", default="", metavar="DIR", help="over mutual TLS")
     found = parser.parse_args()
-    answer(found.answer, shared_memory=not found.sockets)
+    answer(
+        BusConfig(
+            connect=(found.answer,),
+            shared_memory=not found.sockets,
+            certificates=found.certificates,
+        )
+    )
 
 
 if __name__ == "__main__":

@@ -3,24 +3,30 @@
 All between two processes of one machine, four messages under way at a time, rounds interleaved.
 The others carry bytes and nothing else over the loopback, straight from one process to the other;
 ours encodes, checks and decodes a rollout, goes through a router, and repeats what is not
-acknowledged: by way of shared memory, as it does on one machine, and over sockets, as between two.
+acknowledged: by way of shared memory, as it does on one machine, over sockets, as between two, and
+over sockets and mutual TLS, each end with the rights of its role.
 """
 
+import contextlib
+import datetime
 import json
 import os
 import subprocess
+import tempfile
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from benchmarks.environments import interpreter
 from benchmarks.harness import ROOT, cpu_seconds, interleaved, median
-from benchmarks.throughput import a_rollout, linked, rollouts
+from benchmarks.throughput import Link, a_rollout, linked, rollouts
 from services.jobs.bench import Check, Measurement
+from services.jobs.certs.folder import keep
 from shared.messages.wire import encode
 
 QUESTION = "MB/s and CPU a MB of acknowledged rollouts: our bus against TCP, ZeroMQ and gRPC"
 OTHERS = ("tcp", "zeromq", "grpc")
-KINDS = ("ours", "ours over sockets", *OTHERS)
+KINDS = ("ours", "ours over sockets", "ours over mutual TLS", *OTHERS)
 SHARE_OF_GRPC = 1.0
 """Ours may cost at most this times what gRPC costs, CPU a MB."""
 SECONDS = 120.0
@@ -64,20 +70,27 @@ def measure(smoke: bool) -> Measurement:
     """Return rate and CPU of all of them."""
     messages, rounds = (20, 1) if smoke else (400, 7)
     size = len(encode(a_rollout()))
-    with linked() as link, linked(shared_memory=False) as wired:
+    with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
+        keep(Path(folder), ["127.0.0.1"], [], datetime.datetime.now(datetime.UTC), 1)
+        links = [
+            stack.enter_context(one)
+            for one in (
+                linked(),
+                linked(shared_memory=False),
+                linked(shared_memory=False, certificates=folder),
+            )
+        ]
 
-        def ours() -> dict[str, float]:
-            return rollouts(link.bus, messages, link.processes)
-
-        def over_sockets() -> dict[str, float]:
-            return rollouts(wired.bus, messages, wired.processes)
+        def ours(link: Link) -> Callable[[], dict[str, float]]:
+            return lambda: rollouts(link.bus, messages, link.processes)
 
         def other(kind: str) -> Callable[[], dict[str, float]]:
             return lambda: carried(kind, size, messages)
 
-        ours()
-        over_sockets()
-        turns = interleaved(rounds, [ours, over_sockets, *(other(kind) for kind in OTHERS)])
+        own = [ours(link) for link in links]
+        for side in own:  # once, to be warm
+            side()
+        turns = interleaved(rounds, [*own, *(other(kind) for kind in OTHERS)])
     runs: tuple[dict[str, Any], ...] = tuple(
         {
             f"{kind} {name}": figures[name]

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Sequence
 
+import services.learner.uncompiled  # noqa: F401 - first, before anything imports the compiler
 from services.learner.config import LearnerConfig
 from services.learner.service import Learner, RunFacts
 from shared.bus.base import Bus
