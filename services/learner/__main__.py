@@ -3,7 +3,8 @@
 import sys
 from collections.abc import Sequence
 
-import services.learner.uncompiled  # noqa: F401 - first, before anything imports the compiler
+# First, before anything imports the compiler.
+import services.learner.uncompiled  # noqa: F401 # pyright: ignore[reportUnusedImport]
 from services.learner.config import LearnerConfig
 from services.learner.service import Learner, RunFacts
 from shared.bus.base import Bus
