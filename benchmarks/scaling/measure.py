@@ -272,7 +272,8 @@ def measure(plan: Plan, cores: int, kept: KeptRuns) -> Found:
         if seen is not None:
             real.append(seen)
             kept.say(f"{actors} real actors: {seen['samples_per_s']:,.0f} samples/s")
-    usual = statistics.median(one["piece_s"] for one in (parts, *runs, *real))
+    pieces = [one["piece_s"] for one in (parts, *runs, *real)]
+    usual = statistics.median(pieces)
     cost = coefficients_of([at_usual_speed(run, usual) for run in fitted], parts, usual)
     checks: list[Check] = []
     for run in runs:
@@ -284,10 +285,7 @@ def measure(plan: Plan, cores: int, kept: KeptRuns) -> Found:
     return Found(
         coefficients=cost, cores=cores, checks=tuple(checks), memory=tuple(memory),
         runs=tuple(runs), real=tuple(real), skipped=tuple(kept.skipped),
-        speeds=(
-            usual / max(one["piece_s"] for one in (parts, *runs, *real)),
-            usual / min(one["piece_s"] for one in (parts, *runs, *real)),
-        ),
+        speeds=(usual / max(pieces), usual / min(pieces)),
     )  # fmt: skip
 
 

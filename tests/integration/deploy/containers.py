@@ -5,17 +5,16 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any, Self
 
 from services.jobs.settings import Settings
 from shared.bus.ports import free_port
+from tests.integration.hosts.cluster import RIPOSTE, status
 from tests.integration.small import SMALL
-from tests.unit.deploy.found import DEPLOY, OWN_IMAGES, ROOT
+from tests.unit.deploy.found import DEPLOY, ROOT
 
 BASE = "docker.io/library/python:3.11-slim-bookworm"
-RIPOSTE = (sys.executable, "-P", "-m", "services.cli")
 BUILD_SECONDS = 1700.0
 KILL_CHILDREN = """
 import os, pathlib, signal
@@ -134,12 +133,7 @@ class Composed:
 
     def status(self) -> dict[str, Any]:
         """Return what `riposte status --json` says, from outside of the containers."""
-        done = subprocess.run(
-            [*RIPOSTE, "status", "--connect", self._endpoint, "--certificates",
-             self.folder / "certificates", "--run-id", "run", "--json"],
-            cwd=ROOT, capture_output=True, timeout=60, check=False,
-        )  # fmt: skip
-        return json.loads(done.stdout) if done.returncode == 0 else {"services": []}
+        return status(self._endpoint, self.folder / "certificates", "--run-id", "run")
 
     def kill(self, service: str) -> None:
         """Kill what runs in a container, as the kernel would: an engine's own kill is a stop."""
@@ -163,6 +157,3 @@ class Composed:
                      "--format", "{{.Names}}")  # fmt: skip
         (name,) = listed.splitlines()
         return name
-
-
-__all__ = ["OWN_IMAGES", "Composed", "build", "composer", "engine", "ran", "unavailable"]

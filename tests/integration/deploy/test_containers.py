@@ -7,7 +7,6 @@ import pytest
 
 from services.jobs.runs import state_of
 from tests.integration.deploy.containers import (
-    OWN_IMAGES,
     UPDATES,
     Composed,
     build,
@@ -17,6 +16,7 @@ from tests.integration.deploy.containers import (
     unavailable,
 )
 from tests.integration.hosts.cluster import until
+from tests.unit.deploy.found import OWN_IMAGES
 
 pytestmark = [pytest.mark.slow, pytest.mark.zenoh, pytest.mark.timeout(3600)]
 
@@ -38,7 +38,7 @@ def job(images: tuple[str, ...], tmp_path: Path) -> Iterator[Composed]:
         yield made
 
 
-@pytest.mark.parametrize(("image", "has_torch"), [*zip(OWN_IMAGES, (False, True), strict=True)])
+@pytest.mark.parametrize(("image", "has_torch"), list(zip(OWN_IMAGES, (False, True), strict=True)))
 def test_an_image_runs_read_only_as_nobody_in_particular(
     images: tuple[str, ...], image: str, has_torch: bool
 ):

@@ -12,7 +12,7 @@ import pytest
 
 from shared.runtime.process import end
 from tests.integration.deploy.slurm import Slurm, unavailable
-from tests.integration.hosts.cluster import until
+from tests.integration.hosts.cluster import RIPOSTE, status, until
 from tests.integration.small import SMALL
 from tests.integration.training.killing import assert_nothing_lost_nor_counted_twice
 from tests.unit.deploy.found import DEPLOY, ROOT
@@ -26,7 +26,6 @@ pytestmark = [
 HOST = "127.0.7.47"
 """Of this machine alone: the script's port is always 7447."""
 SCRIPT = DEPLOY / "slurm/actors.sbatch"
-RIPOSTE = (sys.executable, "-P", "-m", "services.cli")
 
 
 class Site:
@@ -68,15 +67,8 @@ class Site:
 
     def actors(self) -> set[str]:
         """Return the names of the actors that `riposte status` shows."""
-        done = subprocess.run(
-            [*RIPOSTE, "status", "--connect", f"tls/{HOST}:7447", "--certificates",
-             self._certificates, "--run-id", "run", "--json"],
-            cwd=ROOT, capture_output=True, timeout=60, check=False,
-        )  # fmt: skip
-        if done.returncode:
-            return set()
-        services = json.loads(done.stdout)["services"]
-        return {one["name"] for one in services if one["role"] == "actor"}
+        found = status(f"tls/{HOST}:7447", self._certificates, "--run-id", "run")
+        return {one["name"] for one in found["services"] if one["role"] == "actor"}
 
     def scratch(self) -> list[Path]:
         """Return the actors' folders."""

@@ -65,11 +65,7 @@ class Cluster:
 
     def status(self, *words: str) -> dict[str, Any]:
         """Return what `riposte status --json` says to the operator, on a machine of the network."""
-        where = ("--connect", self.endpoint, "--certificates", str(self.certificates))
-        done = subprocess.run(
-            [*RIPOSTE, "status", *where, *words, "--json"], capture_output=True, timeout=60,
-        )  # fmt: skip
-        return json.loads(done.stdout) if done.returncode == 0 else {"services": []}
+        return status(self.endpoint, self.certificates, *words)
 
     def keep_log(self, host: Host) -> Path:
         """Return the log of the actor on a host, kept with the run's own when its folder goes."""
@@ -156,6 +152,16 @@ class Throttle:
             self._process.send_signal(signal.SIGSTOP)
             self._over.wait(self.PERIOD - self._on)
             self._process.send_signal(signal.SIGCONT)
+
+
+def status(endpoint: str, certificates: Path, *words: str) -> dict[str, Any]:
+    """Return what `riposte status --json` says; no services where it finds none."""
+    where = ("--connect", endpoint, "--certificates", str(certificates))
+    done = subprocess.run(
+        [*RIPOSTE, "status", *where, *words, "--json"], cwd=ROOT, capture_output=True, timeout=60,
+        check=False,
+    )  # fmt: skip
+    return json.loads(done.stdout) if done.returncode == 0 else {"services": []}
 
 
 def until(condition: Callable[[], Any], seconds: float = 90.0) -> Any:
