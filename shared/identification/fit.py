@@ -1,5 +1,6 @@
 """Fits a space to recordings: CMA-ES as in the paper, then least squares from several starts."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +17,12 @@ WINDOW = 1.0
 """Of the parts that a fit begins with (s)."""
 _ENOUGH = 3e-3
 """A step that takes off less than this share of the cost is the last one."""
-_DAMPINGS = (1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0)
+_DAMPINGS = (1e-3, 1e-1, 1.0, 100.0)
+"""Factors of Marquardt's damping that are tried at once."""
+_MENDED = 6
+"""The most steps with one derivative."""
+_SLIGHT = 0.01
+"""A step with a mended derivative that takes off less than this share is its last one."""
 AGREE = 0.02
 """Starts agree whose costs differ by less than this share."""
 
@@ -47,36 +53,60 @@ def polish(
 ) -> Fit:
     """Return a local fit by Levenberg-Marquardt steps within bounds.
 
-    A step is tried at several dampings at once, for a look at five vectors costs a fraction of the
-    derivative. Coordinates at a bound that want to go further stay there for the step.
+    A derivative costs as much as many looks, so it is used for several steps, see :func:`go_down`.
 
     Args:
         space: what is fitted.
         start: float64[n].
         segments: recordings to fit to.
-        steps: the most derivatives.
-        enough: a step that takes off less than this share of the cost is the last one.
+        steps: the most derivatives after the first.
+        enough: what takes off less than this share of the cost with a new derivative is the end.
         known: residual and derivative at the start, if they are known.
     """
-    z, damping = space.clip(start), 1e-2
+    z = space.clip(start)
+    residual, jacobian = space.jacobian(z, segments) if known is None else known
+    fit = Fit(space, z, residual, jacobian, 0.5 * float(residual @ residual))
     for _ in range(steps):
-        residual, jacobian = space.jacobian(z, segments) if known is None else known
-        known = None
-        cost = 0.5 * float(residual @ residual)
-        dampings = [damping * factor for factor in _DAMPINGS]
+        found = go_down(fit, segments)
+        if not found.cost < fit.cost * (1 - enough):
+            break
+        fit = _at(space, found.z, segments)
+    return fit
+
+
+def go_down(fit: Fit, segments: tuple[int, ...], factors: tuple[float, ...] = _DAMPINGS) -> Fit:
+    """Take damped steps with one derivative, mended after each (Broyden 1965).
+
+    A step is tried at several dampings at once. Coordinates at a bound that want to go further
+    stay there for the step.
+
+    Args:
+        fit: where it begins, with the derivative there.
+        segments: recordings to fit to.
+        factors: of the damping, tried at once.
+    """
+    space, z, residual, jacobian, cost = fit.space, fit.z, fit.residual, fit.jacobian, fit.cost
+    damping = 1e-1
+    for _ in range(_MENDED):
+        dampings = [damping * factor for factor in factors]
         tries = damped(space, z, residual, jacobian, dampings)
         found = space.residual(tries, segments)
         costs = 0.5 * np.sum(found**2, axis=1)
         best = int(np.argmin(costs))
-        if not costs[best] < cost:
-            damping *= 1e3
-            if damping > 1e6:
-                break
+        moved = tries[best] - z
+        length = float(moved @ moved)
+        if length > 1e-12:
+            off = found[best] - residual - jacobian @ moved
+            jacobian = jacobian + np.outer(off, moved) / length
+        if costs[best] >= cost:
+            damping *= 100.0
             continue
-        z, damping = tries[best], float(np.clip(dampings[best], 1e-9, 1e3))
-        if costs[best] > cost * (1 - enough):
+        is_enough = costs[best] > cost * (1 - _SLIGHT)
+        z, residual, cost = tries[best], found[best], float(costs[best])
+        damping = max(dampings[best], 1e-4)
+        if is_enough:
             break
-    return _at(space, z, segments)
+    return Fit(space, z, residual, jacobian, cost)
 
 
 def damped(
@@ -113,6 +143,8 @@ class BaseFits:
     """On short parts."""
     parts: Fit
     whole: Fit
+    searched: Float64
+    """float64[n], where the search led that began elsewhere."""
 
 
 def floor_from_base(space: Space) -> Noise:
@@ -151,8 +183,7 @@ def fit_again(space: Space, saved: SavedFits) -> BaseFits:
     nominal = Start(origin, parts.jacobian(origin, pieces)[1])
     begun = _at(parts, np.array(saved.parts), pieces)
     whole = _at(space, np.array(saved.whole), problem.of("train"))
-    agree = saved.starts_agree
-    return BaseFits(nominal, begun, replace(whole, starts_agree=agree))
+    return BaseFits(nominal, begun, replace(whole, starts_agree=saved.starts_agree), whole.z)
 
 
 def _at(space: Space, z: Float64, segments: tuple[int, ...]) -> Fit:
@@ -167,6 +198,32 @@ def fit_base(space: Space, rng: np.random.Generator) -> BaseFits:
     there the arm cannot get far from what was measured, and the loss is nearly a parabola. The
     other is found by CMA-ES.
     """
+    segments = space.problem.of("train")[:1]
+    seed = int(rng.integers(1, 2**31 - 1))
+
+    def losses(zs: Float64) -> Float64:
+        found = space.residual([space.clip(z) for z in zs], segments)
+        return np.sum(np.minimum(found**2, 1e8), axis=1)
+
+    origin = np.zeros(space.size)
+    searched = minimize(losses, origin, *space.bounds, sigma=0.3, seed=seed)
+    return _fitted(space, origin, searched)
+
+
+def fit_without(space: Space, done: BaseFits, doubted: Sequence[int]) -> BaseFits:
+    """Return the base's fit without parameters that it had, from where it was with them.
+
+    Args:
+        space: without them.
+        done: with them.
+        doubted: which of its coordinates they were.
+    """
+    begun, searched = (np.delete(z, doubted) for z in (done.parts.z, done.searched))
+    return _fitted(space, begun, searched)
+
+
+def _fitted(space: Space, near: Float64, searched: Float64) -> BaseFits:
+    """Return the better one of two fits: from ``near`` by way of short parts, and directly."""
     problem = space.problem
     segments = problem.of("train")
     parts = Space(problem.in_parts(WINDOW), space.candidates)
@@ -174,16 +231,9 @@ def fit_base(space: Space, rng: np.random.Generator) -> BaseFits:
     pieces = parts.problem.of("train")
     residual, jacobian = parts.jacobian(origin, pieces)
     nominal = Start(origin, jacobian)
-    begun = polish(parts, origin, pieces, 6, known=(residual, jacobian))
-    seed = int(rng.integers(1, 2**31 - 1))
-
-    def losses(zs: Float64) -> Float64:
-        found = space.residual([space.clip(z) for z in zs], segments[:1])
-        return np.sum(np.minimum(found**2, 1e8), axis=1)
-
-    searched = minimize(losses, origin, *space.bounds, sigma=0.3, seed=seed)
+    known = None if near.any() else (residual, jacobian)
+    begun = polish(parts, near, pieces, 6, known=known)
     fits = [polish(space, start, segments, 6) for start in (begun.z, searched)]
     best = min(fits, key=lambda fit: fit.cost)
     agree = max(fit.cost for fit in fits) <= best.cost * (1 + AGREE) + 1.0
-    whole = Fit(space, best.z, best.residual, best.jacobian, best.cost, agree)
-    return BaseFits(nominal, begun, whole)
+    return BaseFits(nominal, begun, replace(best, starts_agree=agree), fits[1].z)

@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.identification.dataset.types import Float64
-from shared.identification.fit import Fit, Start, damped
+from shared.identification.fit import Fit, Start, damped, go_down
 from shared.identification.problem import Problem
 from shared.identification.screen import Screened
 from shared.identification.space import Space
 
-_ITERATIONS = 6
 _DAMPINGS = (0.01, 0.3, 10.0)
 """Factors of Marquardt's damping that are tried at once."""
 _MENDING = (1e-4, 1e-2, 1.0)
@@ -111,8 +110,12 @@ def _descend(
     base[:rows] = kept[:, :known]
     base[rows : rows + known] = np.diag(1.0 / space.priors[:known])
     jacobian = np.concatenate([base, own], axis=1)
-    down = _go_down(space, z, residual, jacobian, segments)
+    down = go_down(_fit(space, z, residual, jacobian), segments, _DAMPINGS)
     return down.z, down.cost
+
+
+def _fit(space: Space, z: Float64, residual: Float64, jacobian: Float64) -> Fit:
+    return Fit(space, z, residual, jacobian, 0.5 * float(residual @ residual))
 
 
 def settle(space: Space, start: Float64, segments: tuple[int, ...]) -> Fit:
@@ -121,40 +124,9 @@ def settle(space: Space, start: Float64, segments: tuple[int, ...]) -> Fit:
     Twice, where the second derivative still finds something.
     """
     z = space.clip(start)
-    found = None
-    for _ in range(2):
-        residual, jacobian = space.jacobian(z, segments)
-        before = 0.5 * float(residual @ residual)
-        found = _go_down(space, z, residual, jacobian, segments)
-        z = found.z
-        if found.cost > before * (1 - _ENOUGH):
-            break
-    assert found is not None
-    return found
-
-
-def _go_down(
-    space: Space, z: Float64, residual: Float64, jacobian: Float64, segments: tuple[int, ...]
-) -> Fit:
-    """Take damped steps with a derivative that is mended after each (Broyden 1965)."""
-    cost, damping = 0.5 * float(residual @ residual), 1e-1
-    for _ in range(_ITERATIONS):
-        dampings = [damping * factor for factor in _DAMPINGS]
-        tries = damped(space, z, residual, jacobian, dampings)
-        found = space.residual(tries, segments)
-        costs = 0.5 * np.sum(found**2, axis=1)
-        best = int(np.argmin(costs))
-        moved = tries[best] - z
-        length = float(moved @ moved)
-        if length > 1e-12:
-            off = found[best] - residual - jacobian @ moved
-            jacobian = jacobian + np.outer(off, moved) / length
-        if costs[best] >= cost:
-            damping *= 100.0
-            continue
-        is_enough = costs[best] > cost * (1 - _ENOUGH)
-        z, residual, cost = tries[best], found[best], float(costs[best])
-        damping = max(dampings[best], 1e-4)
-        if is_enough:
-            break
-    return Fit(space, z, residual, jacobian, cost)
+    before = _fit(space, z, *space.jacobian(z, segments))
+    found = go_down(before, segments, _DAMPINGS)
+    if found.cost > before.cost * (1 - _ENOUGH):
+        return found
+    again = _fit(space, found.z, *space.jacobian(found.z, segments))
+    return go_down(again, segments, _DAMPINGS)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from shared.identification.base import INERTIA_PRIOR, BaseParameter, base_parameters
+from shared.identification.base import INERTIA_PRIOR, base_parameters
 from shared.identification.dataset.types import Dataset, Float64
 from shared.identification.effect import Candidate, Effect
 from shared.identification.fit import (
@@ -14,6 +14,7 @@ from shared.identification.fit import (
     Start,
     fit_again,
     fit_base,
+    fit_without,
     floor_from_base,
     polish,
 )
@@ -146,11 +147,11 @@ def begin(
     if fits is None and (doubted := _doubted(done.whole)):
         # What is known of a link does not hold, so the base may not bend it: what is wrong there
         # is looked for like any other cause.
-        progress("base fit", 0.5, f"without {', '.join(each.name for each in doubted)}")
-        kept = tuple(each for each in known if each not in doubted)
+        progress("base fit", 0.5, f"without {', '.join(known[index].name for index in doubted)}")
+        kept = tuple(each for index, each in enumerate(known) if index not in doubted)
         problem = Problem(subject, dataset, kept, noise)
         space = Space(problem)
-        done = fit_base(space, rng)
+        done = fit_without(space, done, doubted)
     test = problem.of("test")
     nominal = stretches(problem, space.variant(np.zeros(space.size)), test)
     losses = stretches(problem, space.variant(done.whole.z), test)
@@ -171,11 +172,11 @@ def begin(
     )
 
 
-def _doubted(fit: Fit) -> list[BaseParameter]:
-    """Return the parameters that a fit bends further than what is known of them allows."""
+def _doubted(fit: Fit) -> list[int]:
+    """Return which parameters a fit bends further than what is known of them allows."""
     return [
-        each
-        for each, z in zip(fit.space.problem.parameters, fit.z, strict=False)
+        index
+        for index, (each, z) in enumerate(zip(fit.space.problem.parameters, fit.z, strict=True))
         if each.prior == INERTIA_PRIOR and abs(z) > FAR_FROM_KNOWN * INERTIA_PRIOR
     ]
 

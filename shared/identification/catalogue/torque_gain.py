@@ -11,12 +11,15 @@ from shared.sim.plant.structure import Structure
 
 
 class _Law:
-    """More of what the drive gives, at each joint; for a servo that pulls at the tool."""
+    """More of what the drive gives, at each joint; for a servo that pulls at the tool.
+
+    What the drive gives now is taken to rise as it did in the last step.
+    """
 
     memory = 0
 
     def __call__(self, step: Step, values: Float64, memory: Float64) -> Float64:
-        return values * step.drive
+        return values * (step.drive + step.drive_change)
 
 
 _LAW = _Law()

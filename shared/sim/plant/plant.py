@@ -19,9 +19,11 @@ from shared.sim.parameters import CommandParameters, load_parameters
 Control = Literal["pose", "position", "torque"]
 TOOL = "riposte/tool"
 """Prefix of the sensors that say where the tracked site is."""
+BALANCE = "riposte/centred"
+"""Body at the tool under a pose controller, without mass until damping is centred."""
 _AGENT = AGENTS[1]
 _JOINTS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
-PR2_TIMESTEP = 0.002
+PR2_TIMESTEP = 0.005
 """Of identification, where training takes 10 ms (s)."""
 
 
@@ -73,6 +75,8 @@ def pr2(
         for sensor in list(spec.sensors):
             spec.delete(sensor)
         _track(spec, mujoco.mjtObj.mjOBJ_SITE, f"{_AGENT}/tool", f"{_AGENT}/torso")
+        tool = spec.site(f"{_AGENT}/tool")
+        tool.parent.add_body(name=BALANCE, pos=tool.pos)
         return spec
 
     labels = tuple(values.joints.__struct_fields__)

@@ -11,6 +11,7 @@ import numpy as np
 
 from shared.sim.arm import Float64
 from shared.sim.model import silence
+from shared.sim.plant.centred import centre
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.plant import TOOL, Plant
 from shared.sim.plant.row import FrictionLaw, JointsReport, Row, Step, TorqueLaw, TrackerReport
@@ -96,6 +97,7 @@ class Rollouts:
         self._expanded: dict[str, Float64] = {}
         self._stale: set[str] = set()
         self._needs_constants = False
+        self._drive_before = np.empty(0)
         adr = int(self.model.sensor(f"{TOOL}/position").adr[0])
         self._tool = slice(adr, adr + 7)
 
@@ -112,6 +114,9 @@ class Rollouts:
 
     def _run(self, work: Sequence[tuple[Entry, Recorded]]) -> list[Reports]:
         rows = [self._row(index, entry, recorded) for index, (entry, recorded) in enumerate(work)]
+        if self.plant.control == "pose":
+            for row in rows:
+                centre(row, self._dofs)
         self._restore(rows)
         ids = np.arange(len(rows))
         self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
@@ -245,11 +250,14 @@ class Rollouts:
         if begin == 0:  # what the drives do and hold before the first step
             control[ids] = ctrl[:, 0]
             batch.forward(ids)
+            self._drive_before = np.array(drive)
         for index in range(count):
             control[ids] = ctrl[:, index]
             applied[ids] = 0.0
             if frictions:
                 rubs[joints] = constant
+            change = drive - self._drive_before
+            self._drive_before[:] = drive
             for active in (*laws, *frictions):
                 pick = np.ix_(active.rows, self._dofs)
                 step = Step(
@@ -258,6 +266,7 @@ class Rollouts:
                     q=qpos[np.ix_(active.rows, self._qpos)],
                     qd=qvel[pick],
                     drive=drive[pick],
+                    drive_change=change[pick],
                     gravity=bias[pick],
                 )
                 if isinstance(active, _Rubbing):

@@ -28,6 +28,8 @@ class Step:
     """float64[K, J] (rad/s, m/s)."""
     drive: Float64
     """float64[K, J], what the actuators put on the joints (N m, N), of the last step."""
+    drive_change: Float64
+    """float64[K, J], by how much that rose from the step before (N m, N)."""
     gravity: Float64
     """float64[K, J], gravity, centrifugal and Coriolis torque that the drive has to hold."""
 
