@@ -198,7 +198,11 @@ def fit_base(space: Space, rng: np.random.Generator) -> BaseFits:
     there the arm cannot get far from what was measured, and the loss is nearly a parabola. The
     other is found by CMA-ES.
     """
-    segments = space.problem.of("train")[:1]
+    problem = space.problem
+    first = problem.segments[problem.of("train")[0]].trajectory
+    segments = tuple(
+        index for index in problem.of("train") if problem.segments[index].trajectory == first
+    )
     seed = int(rng.integers(1, 2**31 - 1))
 
     def losses(zs: Float64) -> Float64:
@@ -233,7 +237,11 @@ def _fitted(space: Space, near: Float64, searched: Float64) -> BaseFits:
     nominal = Start(origin, jacobian)
     known = None if near.any() else (residual, jacobian)
     begun = polish(parts, near, pieces, 6, known=known)
-    fits = [polish(space, start, segments, 6) for start in (begun.z, searched)]
+    is_same = parts.problem is problem
+    fits = [
+        begun if is_same else polish(space, begun.z, segments, 6),
+        polish(space, searched, segments, 6),
+    ]
     best = min(fits, key=lambda fit: fit.cost)
     agree = max(fit.cost for fit in fits) <= best.cost * (1 + AGREE) + 1.0
     return BaseFits(nominal, begun, replace(best, starts_agree=agree), fits[1].z)

@@ -107,9 +107,13 @@ class _Missing:
 def _widths(problem: Problem) -> tuple[Width, Width | None]:
     """Return how wide the noise of joints and tracker is, by what repeats differ."""
     noise, count = problem.noise, len(problem.noise.joints)
-    joints, tracker = repeat_differences(problem.dataset, BLOCK, problem.subject.starts)
+    subject = problem.subject
+    pairs = repeat_differences(problem.dataset, BLOCK, subject.starts)
     of_joints = width_of(
-        [each * np.sqrt(0.5) / noise.joints for each in joints],
+        [
+            noise.floors(each.joints * np.sqrt(0.5), noise.whitening(subject.nominal, each.q))
+            for each in pairs
+        ],
         noise.correlation[:count],
         noise.is_measured,
     )
@@ -117,7 +121,7 @@ def _widths(problem: Problem) -> tuple[Width, Width | None]:
         return of_joints, None
     floor = noise.tracker
     return of_joints, width_of(
-        [each * np.sqrt(0.5) / floor for each in tracker],
+        [each.tracker * np.sqrt(0.5) / floor for each in pairs if each.tracker is not None],
         noise.correlation[count : count + 6],
         noise.is_measured,
     )

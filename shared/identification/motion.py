@@ -32,16 +32,20 @@ def motion_of(trajectory: Trajectory) -> Motion:
 
     A recording too short for one is taken to stand still.
     """
-    at = trajectory.joints_at
+    return smooth_motion(trajectory.joints_at, trajectory.q)
+
+
+def smooth_motion(at: Float64, readings: Float64) -> Motion:
+    """Return the motion of positions float64[T, J] at instants float64[T], as :func:`motion_of`."""
     period = max(_PERIOD, float(np.median(np.diff(at))))
     even: Float64 = np.arange(float(at[0]), float(at[-1]), period, dtype=np.float64)
     half = max(round(_SMOOTH / period / 2.0), 2)
     if len(even) <= 2 * half:
-        still = np.zeros_like(trajectory.q)
-        return Motion(trajectory.q, still, still, at)
+        still = np.zeros_like(readings)
+        return Motion(readings, still, still, at)
     near = period * np.arange(-half, half + 1)
     fit = np.linalg.pinv(np.vander(near, 4, increasing=True))
-    q = sampled(at, trajectory.q, even)
+    q = sampled(at, readings, even)
     windows = np.lib.stride_tricks.sliding_window_view(q, 2 * half + 1, axis=0)
     inner = even[half : len(even) - half]
     return Motion(windows @ fit[0], windows @ fit[1], 2.0 * windows @ fit[2], inner)

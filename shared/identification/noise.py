@@ -4,14 +4,16 @@ Half the mean square of the difference of repeats, of the block means that resid
 It has everything that a model cannot know: sensors, and whatever pushes the arm at random.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 
 from shared.identification.dataset.types import Dataset, Float64, Trajectory
+from shared.identification.pushed import Pushed, pushed_of, whitening
 from shared.identification.smoothing import smooth
 from shared.identification.starts import Starts
+from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.signals import pose_error, sampled, sampled_poses
 
 _BAND = 25
@@ -36,18 +38,53 @@ class Noise:
     """float64[C], of neighbouring blocks, joints first."""
     is_measured: bool
     """Whether repeats were there; else only what is faster than the arm was seen."""
+    pushed: Pushed | None = None
+    """Where a controller holds the tool alone: what joints differ by otherwise."""
+    whitened: Float64 | None = None
+    """float64[J], standard deviations of whitened residuals (1)."""
+
+    def floors(self, residuals: Float64, whiten: Float64 | None) -> Float64:
+        """Return residuals of joints in noise floors.
+
+        Args:
+            residuals: float64[B, J], block means (rad, m).
+            whiten: float64[B, J, J], from :meth:`whitening`.
+        """
+        if whiten is None or self.whitened is None:
+            return residuals / self.joints
+        return np.einsum("bij,bj->bi", whiten, residuals) / self.whitened
+
+    def whitening(self, nominal: Rollouts, q: Float64) -> Float64 | None:
+        """Return what :meth:`floors` needs of an arm at postures float64[B, J]; None for most."""
+        return None if self.pushed is None else whitening(self.pushed, nominal, q)
 
 
-def noise_of(dataset: Dataset, block: float, starts: Starts) -> Noise:
+@dataclass(frozen=True)
+class Difference:
+    """What a recording and its repeat differ by, as block means."""
+
+    joints: Float64
+    """float64[B, J] (rad, m)."""
+    tracker: Float64 | None
+    """float64[B', 6] (m, rad)."""
+    q: Float64
+    """float64[B, J], where the joints were (rad, m)."""
+
+
+def noise_of(
+    dataset: Dataset, block: float, starts: Starts, nominal: Rollouts | None = None
+) -> Noise:
     """Return the noise floor of a data set.
 
     Args:
         dataset: the recordings; those with ``repeats`` are compared with what they repeat.
         block: what residuals are averaged over (s).
         starts: what repeats differ by for starting elsewhere.
+        nominal: the arm; None for one that is held by its joints.
     """
-    joints, tracker = repeat_differences(dataset, block, starts)
-    pairs = len(joints)
+    pairs = repeat_differences(dataset, block, starts)
+    joints = [each.joints for each in pairs]
+    tracker = [each.tracker for each in pairs if each.tracker is not None]
     if pairs:
         scale = np.sqrt(0.5)
     else:
@@ -67,29 +104,40 @@ def noise_of(dataset: Dataset, block: float, starts: Starts) -> Noise:
             of_tracker = np.r_[of_tracker[:3], np.repeat(2.0 * of_tracker[4:].mean(), 3)]
             tracker_correlation = tracker_correlation[:6]
         correlation = np.r_[joint_correlation, tracker_correlation]
-    return Noise(of_joints, of_tracker, correlation, is_measured=bool(pairs))
+    found = Noise(of_joints, of_tracker, correlation, is_measured=bool(pairs))
+    differences = [(each.joints, each.q) for each in pairs]
+    pushed = None if nominal is None else pushed_of(nominal, differences, scale)
+    if nominal is None or pushed is None:
+        return found
+    unit = replace(found, pushed=pushed, whitened=np.ones(len(of_joints)))
+    whole = [unit.floors(each.joints, unit.whitening(nominal, each.q)) for each in pairs]
+    _, correlation = _floor(whole, scale)
+    whitened = scale * np.sqrt(np.mean(np.concatenate(whole) ** 2, axis=0))
+    correlation = np.r_[correlation, found.correlation[len(whitened) :]]
+    return replace(unit, whitened=whitened, correlation=correlation)
 
 
-def repeat_differences(
-    dataset: Dataset, block: float, starts: Starts
-) -> tuple[list[Float64], list[Float64]]:
-    """Return what repeats differ by, as block means: float64[B, J] and float64[B, 6] each.
+def repeat_differences(dataset: Dataset, block: float, starts: Starts) -> list[Difference]:
+    """Return what repeats differ by.
 
-    Both are empty without repeats. The variance of a difference is twice that of the noise. What
-    follows from where they started is taken off.
+    The variance of a difference is twice that of the noise. What follows from where they started
+    is taken off.
     """
     by_name = {each.name: each for each in dataset.trajectories}
-    pairs = [(by_name[each.repeats], each) for each in dataset.trajectories if each.repeats]
-    joints = [
-        block_means(first.joints_at, _against(first, second, starts), block)
-        for first, second in pairs
+    return [
+        _difference(by_name[each.repeats], each, block, starts)
+        for each in dataset.trajectories
+        if each.repeats
     ]
-    tracker = [
-        block_means(first.tracker_at, _tracker_against(first, second, starts), block)
-        for first, second in pairs
-        if first.tracker_at is not None and second.tracker_at is not None
-    ]
-    return joints, tracker
+
+
+def _difference(first: Trajectory, second: Trajectory, block: float, starts: Starts) -> Difference:
+    joints = block_means(first.joints_at, _against(first, second, starts), block)
+    tracker = None
+    if first.tracker_at is not None and second.tracker_at is not None:
+        tracker = block_means(first.tracker_at, _tracker_against(first, second, starts), block)
+    q = block_means(first.joints_at, first.q, block)[: len(joints)]
+    return Difference(joints, tracker, q)
 
 
 def _against(first: Trajectory, second: Trajectory, starts: Starts) -> Float64:

@@ -54,15 +54,20 @@ class Problem:
     segments: tuple[Segment, ...] = field(init=False)
     _structures: dict[Structure, Rollouts] = field(default_factory=dict[Structure, Rollouts])
     _bins: dict[int, tuple["_Bins", "_Bins | None"]] = field(init=False)
+    _whitening: dict[int, Float64 | None] = field(init=False)
 
     def __post_init__(self) -> None:
         self.segments = segments_of(self.dataset, self.subject, self.window)
         self._structures.setdefault((), self.subject.nominal)
         self._bins = {}
+        self._whitening = {}
         for index, segment in enumerate(self.segments):
             recorded = segment.recorded
             tracker = None if recorded.tracker_at is None else _Bins.of(recorded.tracker_at)
-            self._bins[index] = (_Bins.of(recorded.joints_at), tracker)
+            of_joints = _Bins.of(recorded.joints_at)
+            self._bins[index] = (of_joints, tracker)
+            q = of_joints.mean(segment.q)
+            self._whitening[index] = self.noise.whitening(self.subject.nominal, q)
 
     def in_parts(self, longest: float) -> "Problem":
         """Return :meth:`windowed`, no longer than what the problem has already."""
@@ -160,7 +165,7 @@ class Problem:
         """Return the residuals of one segment in noise floors, as :meth:`residuals` does."""
         joints, tracker = self.raw(reports, segment)
         of_joints, of_tracker = self._bins[segment]
-        out = of_joints.mean(joints) / self.noise.joints
+        out = self.noise.floors(of_joints.mean(joints), self._whitening[segment])
         if tracker is not None and of_tracker is not None and self.noise.tracker is not None:
             more = of_tracker.mean(tracker) / self.noise.tracker
             rows = min(len(out), len(more))

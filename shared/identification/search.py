@@ -130,7 +130,7 @@ def begin(
     rng = np.random.default_rng(seed)  # of the base fit, which may have been done before
     progress("noise floor", 0.0)
     subject = subject_of(dataset)
-    noise = noise_of(dataset, BLOCK, subject.starts)
+    noise = noise_of(dataset, BLOCK, subject.starts, subject.nominal)
     released = known = base_parameters(subject)
     if fits is not None and not {each.name for each in known} >= set(fits.names):
         fits = None
@@ -241,8 +241,11 @@ def _round(
     found.current, found.current_losses = best.fit, best.losses
     if rivals:
         return False
-    space = Space(found.parts.space.problem, best.fit.space.candidates)
-    found.parts = polish(space, best.fit.z, parts, 2)
+    if found.parts.space.problem is found.problem:
+        found.parts = found.current
+    else:
+        space = Space(found.parts.space.problem, best.fit.space.candidates)
+        found.parts = polish(space, best.fit.z, parts, 2)
     return True
 
 
@@ -281,8 +284,13 @@ def _simplest(useful: list[Tried], rng: np.random.Generator) -> tuple[Tried, tup
 
 
 def _is_alike(best: Tried, other: Tried, rng: np.random.Generator) -> bool:
-    """Return whether the held-out recordings do not prefer the best surely."""
+    """Return whether the held-out recordings do not prefer the best surely.
+
+    More numbers than another has must be worth them: the 95 % interval says so.
+    """
     margin = compare(other.losses, best.losses, rng)
+    if other.numbers < best.numbers and margin.low <= 0.0:
+        return True
     return margin.gain < max(margin.error, ALIKE * best.gain.gain)
 
 

@@ -1,8 +1,7 @@
-"""Parts of recordings that are replayed from a known state.
+"""What a data set is replayed in: whole recordings, or parts of them.
 
-Under a controller that holds the arm to its command a whole recording is one part. Torques let an
-arm drift off, so that only short parts say something; each starts from the measured state, its
-velocity taken from a local fit of the positions.
+Under a controller that holds the arm to its command a whole recording is one part. Elsewhere only
+short parts say something, see :data:`shared.identification.parts.CUTS`.
 """
 
 from dataclasses import dataclass, replace
@@ -10,15 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shared.identification.dataset.types import Dataset, Float64, Trajectory
-from shared.identification.smoothing import smooth
+from shared.identification.parts import CUT, CUTS, Cut, part_of, starts_of, states_of
 from shared.identification.subject import Subject
 from shared.sim.plant.rollouts import Recorded
-from shared.sim.plant.signals import Signal, sampled
-
-TORQUE_WINDOW = 0.3
-"""Of a part under torque control (s)."""
-SMOOTH = 0.05
-"""Readings that a state under torque control is taken from, either side together (s)."""
 
 
 @dataclass(frozen=True)
@@ -43,18 +36,15 @@ def segments_of(
     Args:
         dataset: the recordings.
         subject: the arm.
-        window: length of a part (s); None for whole recordings, or what torque control allows.
+        window: length of a part (s); None for whole recordings, or what the control allows.
     """
-    if window is None and subject.control == "torque":
-        window = TORQUE_WINDOW
+    cut = CUTS.get(subject.control)
+    if window is not None:
+        cut = replace(cut or CUT, length=window)
     found: list[Segment] = []
     for index, trajectory in enumerate(dataset.trajectories):
-        if trajectory.repeats:
-            continue
-        if window is None:
-            found.append(_part(index, trajectory, 0.0, np.inf, None))
-        else:
-            found += _windows(index, trajectory, window, subject)
+        if not trajectory.repeats:
+            found += _segments(index, trajectory, cut, subject.plant.timestep)
     names = tuple(each.name for each in dataset.trajectories)
     return tuple(
         replace(each, recorded=replace(each.recorded, earlier=names[: each.trajectory]))
@@ -62,46 +52,24 @@ def segments_of(
     )
 
 
-def _windows(index: int, trajectory: Trajectory, window: float, subject: Subject) -> list[Segment]:
-    at = trajectory.joints_at
-    period = float(np.median(np.diff(at)))
-    even = np.arange(at[0], at[-1], period)
-    q = sampled(at, trajectory.q, even)
-    width = max(round(SMOOTH / period) // 2 * 2 + 1, 7)
-    if len(even) <= 2 * width:
-        return [_part(index, trajectory, 0.0, np.inf, None)]
-    position = smooth(q, width)
-    speed = smooth(q, width, period)
-    starts = np.arange(at[0] + width * period, at[-1] - 0.5 * window, window)
-    ends = np.r_[starts[1:], starts[-1:] + window]  # no reading is of two parts
-    # MuJoCo's Euler step takes the position with the speed after it: it is of second order if the
-    # speed is given half a step before the position (Stormer and Verlet's method).
-    before = starts - 0.5 * subject.plant.timestep
-    states = list(zip(sampled(even, position, starts), sampled(even, speed, before), strict=True))
+def _segments(
+    index: int, trajectory: Trajectory, cut: Cut | None, timestep: float
+) -> list[Segment]:
+    begins = np.zeros(0) if cut is None else starts_of(trajectory, cut)
+    if cut is None or not len(begins):
+        known = (trajectory.initial_q, trajectory.initial_qd)
+        return [_segment(index, trajectory, 0.0, np.inf, known)]
+    ends = np.r_[begins[1:], begins[-1:] + cut.length]  # no reading is of two parts
+    states = states_of(trajectory, begins, timestep, cut)
     return [
-        _part(index, trajectory, float(start), float(end), state)
-        for start, end, state in zip(starts, ends, states, strict=True)
+        _segment(index, trajectory, float(begin), float(end), state)
+        for begin, end, state in zip(begins, ends, states, strict=True)
     ]
 
 
-def _part(
-    index: int, of: Trajectory, begin: float, end: float, state: tuple[Float64, Float64] | None
+def _segment(
+    index: int, of: Trajectory, begin: float, end: float, state: tuple[Float64, Float64]
 ) -> Segment:
-    pick = (of.joints_at >= begin) & (of.joints_at < end)
-    tracker_at = tracker = None
-    if of.tracker_at is not None and of.tracker is not None:
-        seen = (of.tracker_at >= begin) & (of.tracker_at < end)
-        if seen.any():
-            tracker_at, tracker = of.tracker_at[seen] - begin, of.tracker[seen]
-    q0, qd0 = (of.initial_q, of.initial_qd) if state is None else state
-    recorded = Recorded(
-        initial_q=q0,
-        initial_qd=qd0,
-        command=Signal(of.command_at - begin, of.command),
-        logged_q=Signal(of.joints_at - begin, of.q),
-        joints_at=of.joints_at[pick] - begin,
-        tracker_at=tracker_at,
-        trajectory=of.name,
-        begin=begin,
-    )
-    return Segment(index, recorded, of.q[pick], tracker)
+    recorded, joints, tracker = part_of(of, begin, end, state)
+    poses = None if of.tracker is None or not len(tracker) else of.tracker[tracker]
+    return Segment(index, recorded, of.q[joints], poses)

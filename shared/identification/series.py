@@ -18,6 +18,8 @@ from shared.sim.plant.targets import as_if_at
 
 _PERIOD = 0.02
 """Of the instants at which a recording's load is taken (s)."""
+_AROUND = 0.2
+"""Either side of what is replayed, of which the load is taken too (s)."""
 
 
 def series(subject: Subject, label: str, part: str) -> Structure:
@@ -56,7 +58,9 @@ def hide_from_controller(row: Row, label: str, bent: Callable[[Float64], Float64
 
 def _followed(row: Row, label: str, bent: Callable[[Float64], Float64]) -> tuple[Float64, Float64]:
     """Return instants, and where the links are there if the motors are where the log has them."""
-    logged = row.logged_q
+    log = row.logged_q
+    is_near = (log.at >= -_AROUND) & (log.at <= row.duration + _AROUND)
+    logged = Signal(log.at[is_near], log.values[is_near])
     at: Float64 = np.arange(float(logged.at[0]), float(logged.at[-1]), _PERIOD, dtype=np.float64)
     # A local mean takes the encoders' noise off before it is differentiated twice.
     near = np.linspace(-1.0, 1.0, 9) * _PERIOD

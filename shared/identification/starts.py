@@ -1,17 +1,19 @@
-"""What a repeat differs by because it started in another state than what it repeats.
+"""What a repeat differs by because it was in another state than what it repeats.
 
 A controller of tool poses leaves the elbow free: the arm comes to the start of a motion in one
 posture, to the start of its repeat in another, and is in another all the way. That is the arm, not
-noise, and the nominal model knows most of it.
+noise, and the nominal model knows most of it. Where recordings are replayed in parts it is asked
+for each part anew, since each begins at the measured state.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shared.identification.dataset.types import Float64, Trajectory
-from shared.sim.plant.rollouts import Recorded, Rollouts
+from shared.identification.parts import Cut, part_of, starts_of, states_of
+from shared.sim.plant.rollouts import Recorded, Reports, Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import pose_error
 
@@ -33,28 +35,86 @@ Starts = Mapping[str, Apart]
 """By the name of the repeat; those that start alike are left out."""
 
 
-def starts_apart(nominal: Rollouts, recorded: Sequence[tuple[Trajectory, Recorded]]) -> Starts:
+def starts_apart(
+    nominal: Rollouts,
+    recorded: Sequence[tuple[Trajectory, Recorded]],
+    cut: Cut | None = None,
+) -> Starts:
     """Return what repeats differ by in the nominal model for starting elsewhere.
 
     Args:
         nominal: the arm as its model file has it.
         recorded: every recording, and what it is replayed from.
+        cut: says how recordings are replayed in parts; None where they are not.
     """
-    found = {trajectory.name: replayed for trajectory, replayed in recorded}
+    found = {trajectory.name: (trajectory, replayed) for trajectory, replayed in recorded}
     out: dict[str, Apart] = {}
-    for each, second in recorded:
-        if not each.repeats:
+    for second, replayed in recorded:
+        if not second.repeats:
             continue
-        first = found[each.repeats]
-        if float(np.abs(first.initial_q - second.initial_q).max()) < LEAST:
-            continue
-        again = replace(second, joints_at=first.joints_at, tracker_at=first.tracker_at)
-        one, other = nominal.run([(_as_it_is, first), (_as_it_is, again)])
-        tracker = None
-        if one.tracker is not None and other.tracker is not None:
-            tracker = np.nan_to_num(pose_error(one.tracker, other.tracker))
-        out[each.name] = Apart(np.nan_to_num(one.q - other.q), tracker)
+        first, from_first = found[second.repeats]
+        pairs = [] if cut is None else list(_parts(first, second, cut, nominal))
+        if not pairs:
+            if float(np.abs(from_first.initial_q - replayed.initial_q).max()) < LEAST:
+                continue
+            whole = np.arange(len(first.joints_at))
+            tracked = np.arange(0 if first.tracker_at is None else len(first.tracker_at))
+            pairs = [_Pair(from_first, replayed, whole, tracked)]
+        out[second.name] = _apart(nominal, first, pairs)
     return out
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """The same motion from two states, and which readings of the first recording it covers."""
+
+    first: Recorded
+    second: Recorded
+    joints: np.ndarray
+    tracker: np.ndarray
+
+
+def _parts(first: Trajectory, second: Trajectory, cut: Cut, nominal: Rollouts) -> Iterable[_Pair]:
+    begins = starts_of(first, cut)
+    begins = begins[begins < second.joints_at[-1]] if len(starts_of(second, cut)) else begins[:0]
+    if not len(begins):
+        return
+    ends = np.r_[begins[1:], begins[-1:] + cut.length]
+    timestep = nominal.plant.timestep
+    states = zip(
+        states_of(first, begins, timestep, cut),
+        states_of(second, begins, timestep, cut),
+        strict=True,
+    )
+    for begin, end, (one, other) in zip(begins, ends, states, strict=True):
+        part, joints, tracker = part_of(first, float(begin), float(end), one)
+        yield _Pair(part, part_of(second, float(begin), float(end), other)[0], joints, tracker)
+
+
+def _apart(nominal: Rollouts, of: Trajectory, pairs: Sequence[_Pair]) -> Apart:
+    """Return what pairs differ by; nothing where none covers a reading."""
+    work = [
+        part
+        for pair in pairs
+        for part in (
+            pair.first,
+            replace(pair.second, joints_at=pair.first.joints_at, tracker_at=pair.first.tracker_at),
+        )
+    ]
+    found = nominal.run([(_as_it_is, part) for part in work])
+    joints = np.zeros_like(of.q)
+    tracker = None if of.tracker is None else np.zeros((len(of.tracker), 6))
+    for pair, one, other in zip(pairs, found[::2], found[1::2], strict=True):
+        joints[pair.joints] = np.nan_to_num(one.q - other.q)
+        if tracker is not None and len(pair.tracker):
+            tracker[pair.tracker] = _tracker_apart(one, other)
+    return Apart(joints, tracker)
+
+
+def _tracker_apart(one: Reports, other: Reports) -> Float64:
+    assert one.tracker is not None
+    assert other.tracker is not None
+    return np.nan_to_num(pose_error(one.tracker, other.tracker))
 
 
 def _as_it_is(_: Row) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from shared.errors import IdentificationError
 from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource, Trajectory
 from shared.identification.motion import motion_of
+from shared.identification.parts import CUTS
 from shared.identification.ripples import ripples_of
 from shared.identification.slips import slip_of
 from shared.identification.starts import Starts, starts_apart
@@ -70,7 +71,8 @@ class Subject:
         if self.control == "torque":
             return {}
         replayed = _replayed(self.recordings)
-        return starts_apart(self.nominal, list(zip(self.recordings, replayed, strict=True)))
+        recorded = list(zip(self.recordings, replayed, strict=True))
+        return starts_apart(self.nominal, recorded, CUTS.get(self.control))
 
     @property
     def control(self) -> Control:

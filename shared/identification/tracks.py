@@ -11,8 +11,8 @@ from shared.identification.dataset.types import Float64, Trajectory
 from shared.identification.efforts import effort_of
 from shared.identification.motion import motion_of
 from shared.identification.noise import block_means
+from shared.identification.parts import CUT, CUTS, Cut, width_of
 from shared.identification.problem import BLOCK, DIVERGED, Problem, Variant
-from shared.identification.segments import SMOOTH
 from shared.identification.smoothing import smooth
 from shared.sim.plant.inverse import inverse_dynamics
 from shared.sim.plant.kinematics import tool_poses
@@ -138,23 +138,25 @@ def _joints(problem: Problem, segment: int, reports: Reports) -> tuple[Float64, 
     """Return instants and joint residuals of a segment's blocks."""
     recorded = problem.segments[segment].recorded
     at = recorded.joints_at - recorded.joints_at[0]
-    x = block_means(at, problem.segments[segment].q - reports.q, BLOCK) / problem.noise.joints
+    logged = problem.segments[segment].q
+    whiten = problem.noise.whitening(problem.subject.nominal, block_means(at, logged, BLOCK))
+    x = problem.noise.floors(block_means(at, logged - reports.q, BLOCK), whiten)
     middles = block_means(at, recorded.joints_at[:, None], BLOCK)[:, 0]
     if recorded.begin > 0.0:
-        spread = _spread(at, middles)
+        spread = _spread(at, middles, CUTS.get(problem.subject.control, CUT))
         if not problem.noise.is_measured:  # then the floor is what parts leave, spread and all
             spread /= np.median(spread)
         x /= spread[:, None]
     return recorded.begin + middles, x
 
 
-def _spread(at: Float64, middles: Float64) -> Float64:
+def _spread(at: Float64, middles: Float64, cut: Cut) -> Float64:
     """Return float64[B]: how the noise of a measured start spreads as a part goes on (1).
 
     The start's velocity is a local cubic's, and white noise of readings makes it wrong.
     """
     period = float(np.median(np.diff(at))) if len(at) > 1 else BLOCK
-    width = max(round(SMOOTH / period) // 2 * 2 + 1, 7)
+    width = width_of(period, cut)
     unit = np.eye(width)[:, width // 2 : width // 2 + 1]
     readings = max(BLOCK / period, 1.0)
     of_rate = float(np.linalg.norm(smooth(unit, width, period))) * np.sqrt(readings)

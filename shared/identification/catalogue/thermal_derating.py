@@ -2,8 +2,8 @@
 
 A warm winding has more resistance, and what a voltage makes of torque falls in proportion (MuJoCo's
 ``dcmotor`` has the same form): torque / (1 + loss * heat), where heat is the drive's torque squared
-over time, forgotten with ``MEMORY``. A drive that was asked for torques is as warm at the start as
-those before made it; any other starts cold.
+over time, forgotten with ``MEMORY``. A part of a recording begins as warm as what came before in it
+made the drive.
 """
 
 import functools
@@ -12,9 +12,11 @@ import numpy as np
 
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
+from shared.identification.motion import smooth_motion
 from shared.identification.passive import at_joint
 from shared.identification.places import moving, place_of
 from shared.identification.subject import Subject
+from shared.sim.plant.inverse import inverse_dynamics
 from shared.sim.plant.row import Row, Step
 from shared.sim.plant.structure import Structure
 
@@ -22,6 +24,10 @@ MEMORY = 120.0
 """Time in which most of the warmth is gone (s), of a motor's winding in its housing."""
 _SHORTEST = 2.0
 """Recordings with less in one piece show no history (s)."""
+_FEWEST = 20
+"""Readings that a motion can be told from."""
+_SPARSE = 5
+"""Of the instants of a motion, every so many are looked at."""
 
 
 class _Law:
@@ -75,9 +81,9 @@ class ThermalDerating:
 
 
 def _heat_before(row: Row, place: str) -> float:
-    """Return the heat of torques that were commanded before the arm's time 0."""
+    """Return the heat of torques before the arm's time 0: as commanded, or as the motion took."""
     if row.plant.control != "torque":
-        return 0.0
+        return _heat_of_motion(row, row.plant.labels.index(place))
     before = row.command.at < 0.0
     if not before.any():
         return 0.0
@@ -89,6 +95,20 @@ def _heat_before(row: Row, place: str) -> float:
         for drive in drives
     ]
     torque = row.command.values[before] @ np.asarray(gears)
+    return float(np.sum(np.square(torque) * spans * np.exp(at / MEMORY)))
+
+
+def _heat_of_motion(row: Row, joint: int) -> float:
+    """Return the heat of the torques that the nominal arm's logged motion took before time 0."""
+    before = row.logged_q.at < 0.0
+    if before.sum() < _FEWEST:
+        return 0.0
+    motion = smooth_motion(row.logged_q.at[before], row.logged_q.values[before])
+    at, q, qd, qdd = (
+        each[::_SPARSE] for each in (motion.at, motion.q, motion.qd, motion.qdd)
+    )  # fmt: skip
+    torque = inverse_dynamics(row.plant, row.model, q, qd, qdd)[:, joint]
+    spans = np.gradient(at) if len(at) > 1 else np.zeros(1)
     return float(np.sum(np.square(torque) * spans * np.exp(at / MEMORY)))
 
 

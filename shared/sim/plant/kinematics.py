@@ -7,9 +7,9 @@ import numpy as np
 
 from shared.sim.arm import Float64
 from shared.sim.plant.plant import TOOL, Plant
-from shared.sim.plant.poses import conjugate, inverse, product, rotated, seen_from, turn
+from shared.sim.plant.poses import conjugate, cross, inverse, product, rotated, seen_from
 
-_HOME = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+_XBODY = int(mujoco.mjtObj.mjOBJ_XBODY)
 
 
 def tool_poses(plant: Plant, model: mujoco.MjModel, q: Float64) -> Float64:
@@ -22,8 +22,8 @@ def tool_poses(plant: Plant, model: mujoco.MjModel, q: Float64) -> Float64:
         model: of it, compiled; its nominal numbers.
         q: float64[T, J], logged joints (rad, m).
     """
-    tool, base = _ends(plant, model, q)
-    return tool.pose if base is None else seen_from(inverse(base.pose), tool.pose)
+    at = _moved(plant, model, q)
+    return at.tool if at.base is None else seen_from(inverse(at.base), at.tool)
 
 
 def tool_motion(plant: Plant, model: mujoco.MjModel, q: Float64) -> tuple[Float64, Float64]:
@@ -32,89 +32,92 @@ def tool_motion(plant: Plant, model: mujoco.MjModel, q: Float64) -> tuple[Float6
     The Jacobian, float64[T, 6, J], makes velocity and angular velocity of the joints' velocities,
     in the frame of the poses, which no logged joint moves.
     """
-    tool, base = _ends(plant, model, q)
-    jacobian = np.zeros((len(q), 6, len(plant.joints)))
-    for column, joint in tool.joints.items():
-        if joint.is_slide:
-            jacobian[:, :3, column] = joint.axis
-        else:
-            jacobian[:, :3, column] = np.cross(joint.axis, tool.pose[:, :3] - joint.anchor)
-            jacobian[:, 3:, column] = joint.axis
-    if base is None:
-        return tool.pose, jacobian
-    back = conjugate(base.pose[:, None, 3:])
-    for part in (slice(0, 3), slice(3, 6)):
-        jacobian[:, part] = rotated(back, jacobian[:, part].swapaxes(1, 2)).swapaxes(1, 2)
-    return seen_from(inverse(base.pose), tool.pose), jacobian
+    at = _moved(plant, model, q)
+    joints = np.array([int(model.joint(name).id) for name in plant.joints])
+    slides = model.jnt_type[joints] == int(mujoco.mjtJoint.mjJNT_SLIDE)
+    lever = at.tool[:, None, :3] - at.anchors
+    turning = np.where(slides[:, None], 0.0, at.axes)
+    moving = np.where(slides[:, None], at.axes, cross(at.axes, lever))
+    is_above = np.array([_carries(model, int(model.jnt_bodyid[one]), at.body) for one in joints])
+    jacobian = np.concatenate([moving, turning], axis=2) * is_above[:, None]
+    if at.base is None:
+        return at.tool, jacobian.swapaxes(1, 2)
+    back = conjugate(at.base[:, None, 3:])
+    parts = [rotated(back, jacobian[:, :, part]) for part in (slice(0, 3), slice(3, 6))]
+    seen = seen_from(inverse(at.base), at.tool)
+    return seen, np.concatenate(parts, axis=2).swapaxes(1, 2)
 
 
 @dataclass(frozen=True)
-class _Joint:
-    """A joint in the world, at each posture."""
+class _At:
+    """An arm at each posture, in the world."""
 
-    anchor: Float64
-    """float64[T, 3] (m)."""
-    axis: Float64
-    """float64[T, 3]."""
-    is_slide: bool
-
-
-@dataclass
-class _End:
-    """What a chain of bodies ends in."""
-
-    pose: Float64
-    """float64[T, 7] in the world."""
-    joints: dict[int, _Joint]
-    """By column of the postures."""
+    tool: Float64
+    """float64[T, 7]."""
+    base: Float64 | None
+    """float64[T, 7], what the tool's pose is measured from; None is the world."""
+    anchors: Float64
+    """float64[T, J, 3], of the logged joints (m)."""
+    axes: Float64
+    """float64[T, J, 3]."""
+    body: int
+    """That the tool is fixed to."""
 
 
-def _ends(plant: Plant, model: mujoco.MjModel, q: Float64) -> tuple[_End, _End | None]:
-    """Return the tool, and what its pose is measured from; None is the world."""
+def _moved(plant: Plant, model: mujoco.MjModel, q: Float64) -> _At:
+    joints = np.array([int(model.joint(name).id) for name in plant.joints])
+    places = model.jnt_qposadr[joints]
     sensor = int(model.sensor(f"{TOOL}/position").id)
-    columns = {int(model.joint(name).id): index for index, name in enumerate(plant.joints)}
-    kind, index = int(model.sensor_objtype[sensor]), int(model.sensor_objid[sensor])
-    tool = _end(model, kind, index, columns, q)
-    if model.sensor_refid[sensor] < 0:
-        return tool, None
-    kind, index = int(model.sensor_reftype[sensor]), int(model.sensor_refid[sensor])
-    return tool, _end(model, kind, index, columns, q)
+    tool = _Fixed.of(model, int(model.sensor_objtype[sensor]), int(model.sensor_objid[sensor]))
+    base = None
+    if model.sensor_refid[sensor] >= 0:
+        kind, index = int(model.sensor_reftype[sensor]), int(model.sensor_refid[sensor])
+        base = _Fixed.of(model, kind, index)
+    bodies = [tool.body] if base is None else [tool.body, base.body]
+    data = mujoco.MjData(model)
+    postures = np.tile(data.qpos, (len(q), 1))
+    postures[:, places] = q
+    seen = (data.xpos, data.xquat, data.xanchor, data.xaxis)
+    kept = [np.empty((len(q), *each.shape)) for each in seen]
+    qpos = data.qpos
+    for row, posture in enumerate(postures):
+        qpos[:] = posture
+        mujoco.mj_kinematics(model, data)
+        for array, now in zip(kept, seen, strict=True):
+            array[row] = now
+    frames = np.concatenate([kept[0][:, bodies], kept[1][:, bodies]], axis=2)
+    return _At(
+        tool=tool.seen(frames[:, 0]),
+        base=None if base is None else base.seen(frames[:, 1]),
+        anchors=kept[2][:, joints],
+        axes=kept[3][:, joints],
+        body=tool.body,
+    )
 
 
-def _end(model: mujoco.MjModel, kind: int, index: int, columns: dict[int, int], q: Float64) -> _End:
-    """Return where a site or a body is."""
-    is_site = kind == int(mujoco.mjtObj.mjOBJ_SITE)
-    body = int(model.site_bodyid[index]) if is_site else index
-    chain: list[int] = []
-    while body:
-        chain.append(body)
-        body = int(model.body_parentid[body])
-    end = _End(np.tile(_HOME, (len(q), 1)), {})
-    for link in reversed(chain):
-        here = np.concatenate([model.body_pos[link], model.body_quat[link]])
-        end.pose = seen_from(end.pose, here)
-        first = int(model.body_jntadr[link])
-        for joint in range(first, first + int(model.body_jntnum[link])):
-            if joint in columns:
-                home = float(model.qpos0[model.jnt_qposadr[joint]])
-                _move(model, joint, end, columns[joint], q[:, columns[joint]] - home)
-    if is_site:
-        here = np.concatenate([model.site_pos[index], model.site_quat[index]])
-        end.pose = seen_from(end.pose, here)
-    return end
+@dataclass(frozen=True)
+class _Fixed:
+    """A frame that is fixed to a body."""
+
+    body: int
+    at: Float64
+    """float64[7] in the body's frame."""
+
+    @staticmethod
+    def of(model: mujoco.MjModel, kind: int, index: int) -> "_Fixed":
+        if kind == _XBODY:
+            return _Fixed(index, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
+        at = np.concatenate([model.site_pos[index], model.site_quat[index]])
+        return _Fixed(int(model.site_bodyid[index]), at)
+
+    def seen(self, frames: Float64) -> Float64:
+        """Return float64[T, 7] of the body's frames."""
+        turned = product(frames[:, 3:], self.at[3:])
+        return np.concatenate([frames[:, :3] + rotated(frames[:, 3:], self.at[:3]), turned], axis=1)
 
 
-def _move(model: mujoco.MjModel, joint: int, end: _End, column: int, by: Float64) -> None:
-    """Move a link by its joint: float64[T] (rad, m)."""
-    pose = end.pose
-    own: Float64 = model.jnt_axis[joint]
-    axis = rotated(pose[:, 3:], own)
-    anchor = pose[:, :3] + rotated(pose[:, 3:], model.jnt_pos[joint])
-    is_slide = int(model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
-    end.joints[column] = _Joint(anchor, axis, is_slide)
-    if is_slide:
-        end.pose = np.concatenate([pose[:, :3] + by[:, None] * axis, pose[:, 3:]], axis=1)
-        return
-    turned = product(pose[:, 3:], turn(by[:, None] * own))
-    at = anchor - rotated(turned, model.jnt_pos[joint])
-    end.pose = np.concatenate([at, turned], axis=1)
+def _carries(model: mujoco.MjModel, body: int, other: int) -> bool:
+    """Return whether a body moves with another."""
+    while other and other != body:
+        other = int(model.body_parentid[other])
+    return other == body

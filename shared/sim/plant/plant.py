@@ -23,7 +23,7 @@ BALANCE = "riposte/centred"
 """Body at the tool under a pose controller, without mass until damping is centred."""
 _AGENT = AGENTS[1]
 _JOINTS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
-PR2_TIMESTEP = 0.005
+PR2_TIMESTEP = 0.0025
 """Of identification, where training takes 10 ms (s)."""
 
 

@@ -28,13 +28,15 @@ def rms(values: np.ndarray) -> float:
 
 def test_what_follows_from_the_start_is_not_noise(elsewhere: Dataset):
     starts = subject_of(elsewhere).starts
-    (raw,), (raw_tracker,) = repeat_differences(elsewhere, BLOCK, {})
-    (joints,), (tracker,) = repeat_differences(elsewhere, BLOCK, starts)
+    (raw,) = repeat_differences(elsewhere, BLOCK, {})
+    (corrected,) = repeat_differences(elsewhere, BLOCK, starts)
+    assert raw.tracker is not None
+    assert corrected.tracker is not None
     # two recordings, two readings a block: the noise of a reading
-    assert rms(joints) == pytest.approx(JOINT_NOISE, rel=0.1)
-    assert rms(raw) > 50.0 * JOINT_NOISE
-    assert rms(tracker[:, :3]) == pytest.approx(TRACKER_NOISE, rel=0.15)
-    assert rms(raw_tracker[:, :3]) > 5.0 * TRACKER_NOISE
+    assert rms(corrected.joints) == pytest.approx(JOINT_NOISE, rel=0.1)
+    assert rms(raw.joints) > 50.0 * JOINT_NOISE
+    assert rms(corrected.tracker[:, :3]) == pytest.approx(TRACKER_NOISE, rel=0.15)
+    assert rms(raw.tracker[:, :3]) > 5.0 * TRACKER_NOISE
 
 
 def test_repeats_that_start_alike_are_not_corrected(tmp_path: Path):
