@@ -136,8 +136,10 @@ def _difference(first: Trajectory, second: Trajectory, block: float, starts: Sta
     tracker = None
     if first.tracker_at is not None and second.tracker_at is not None:
         tracker = block_means(first.tracker_at, _tracker_against(first, second, starts), block)
+        tracker = tracker[np.isfinite(tracker).all(axis=1)]
     q = block_means(first.joints_at, first.q, block)[: len(joints)]
-    return Difference(joints, tracker, q)
+    is_known = np.isfinite(joints).all(axis=1)
+    return Difference(joints[is_known], tracker, q[is_known])
 
 
 def _against(first: Trajectory, second: Trajectory, starts: Starts) -> Float64:

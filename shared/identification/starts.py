@@ -26,9 +26,9 @@ class Apart:
     """What the model says that two recordings differ by."""
 
     joints: Float64
-    """float64[T, J] at the first recording's readings (rad, m)."""
+    """float64[T, J] at the first recording's readings (rad, m); NaN of those in no part."""
     tracker: Float64 | None
-    """float64[K, 6] (m, rad)."""
+    """float64[K, 6] (m, rad), the same."""
 
 
 Starts = Mapping[str, Apart]
@@ -92,7 +92,7 @@ def _parts(first: Trajectory, second: Trajectory, cut: Cut, nominal: Rollouts) -
 
 
 def _apart(nominal: Rollouts, of: Trajectory, pairs: Sequence[_Pair]) -> Apart:
-    """Return what pairs differ by; nothing where none covers a reading."""
+    """Return what pairs differ by."""
     work = [
         part
         for pair in pairs
@@ -102,8 +102,8 @@ def _apart(nominal: Rollouts, of: Trajectory, pairs: Sequence[_Pair]) -> Apart:
         )
     ]
     found = nominal.run([(_as_it_is, part) for part in work])
-    joints = np.zeros_like(of.q)
-    tracker = None if of.tracker is None else np.zeros((len(of.tracker), 6))
+    joints = np.full_like(of.q, np.nan)
+    tracker = None if of.tracker is None else np.full((len(of.tracker), 6), np.nan)
     for pair, one, other in zip(pairs, found[::2], found[1::2], strict=True):
         joints[pair.joints] = np.nan_to_num(one.q - other.q)
         if tracker is not None and len(pair.tracker):

@@ -2,8 +2,10 @@
 
 MuJoCo's implicit integrators solve (M + h D) v' = M v + h f for the next velocity: first order in
 the damping D. With the mean of both velocities it is (M + h D / 2) v' = (M - h D / 2) v + h f,
-second order (Crank and Nicolson 1947): the same equation with M - h D / 2 for M. So an arm that
-has that much less inertia, in its joints and at its tool, takes steps of second order.
+second order (Crank and Nicolson 1947): the same equation with M - h D / 2 for M. So damping is in
+the middle of a step for an arm that has that much less inertia, in its joints and at its tool.
+What is left of first order are centrifugal and Coriolis torques, of the speed before a step: half
+of the error of a PR2's joints, less of its tool's.
 
 For arms under a pose controller: what a servo's gains do to a light motor at the step that an MJCF
 file asks for may not be stable with less inertia.
