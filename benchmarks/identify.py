@@ -1,11 +1,12 @@
 """Hides effects in data sets and counts how often `riposte identify` names them.
 
 The protocol is in ``identification/protocol.py``; every finished data set is a line of
-``runs/identify-COMMIT.jsonl``, so that a second call goes on. All of it takes hours; a share:
-``python -m benchmarks.identify --share 0.05``.
+``runs/identify-COMMIT.jsonl``, so that a second call goes on. All of it takes hours; a share, or
+what is done in so many minutes: ``python -m benchmarks.identify --share 0.05 --minutes 30``.
 """
 
 import argparse
+import shlex
 import sys
 import tempfile
 from pathlib import Path
@@ -14,7 +15,8 @@ from benchmarks.harness import ROOT
 from benchmarks.identification.protocol import protocol, smoke
 from benchmarks.identification.running import PROCESSES, run
 from benchmarks.identification.table import checks_of, confusion, confusion_text, curve
-from services.jobs.bench import Measurement, report_of, text_of
+from services.jobs.bench import RESULTS, Check, Measurement, add_row, report_of, text_of
+from shared.errors import RiposteError
 from shared.runtime.build import commit
 
 QUESTION = "how often the hidden effect is named, and how often one that is not there"
@@ -35,18 +37,27 @@ def default_path() -> Path:
     return ROOT / "runs" / f"identify-{commit() or 'unknown'}.jsonl"
 
 
-def measured(path: Path, share: float, processes: int = PROCESSES) -> Measurement:
+def measured(
+    path: Path, share: float, processes: int = PROCESSES, minutes: float | None = None
+) -> Measurement:
     """Run a share of the protocol, or go on with it; 0 is the smoke test.
 
     Args:
         path: of the records.
         share: of the protocol's numbers.
         processes: how many at once.
+        minutes: after which no data set is begun; None for as long as it takes.
+
+    Raises:
+        RiposteError: no single effect was looked for in that time.
     """
     trials = protocol(share) if share else smoke()
     every = BASELINES_EVERY if share else 0
-    records = run(trials, path, every, processes)
+    records = run(trials, path, every, processes, minutes)
     first, *others = checks_of(records)
+    if not first.name.startswith("right effect"):
+        raise RiposteError(f"no data set with one effect was done in {minutes:g} minutes")
+    others.append(Check(name=f"data sets done, of {len(trials)}", value=float(len(records))))
     print(confusion_text(records), file=sys.stderr)
     names = {check.name: check for check in others}
     baseline = next((names[name] for name in names if "all_at_once: right" in name), None)
@@ -67,13 +78,28 @@ def main() -> int:
     parser.add_argument("--share", type=float, default=1.0, help="of the protocol's numbers (1)")
     parser.add_argument("--out", type=Path, default=default_path(), help="JSON lines (%(default)s)")
     parser.add_argument("--processes", type=int, default=PROCESSES, help="at once (%(default)s)")
+    parser.add_argument("--minutes", type=float, help="after which no data set is begun")
+    parser.add_argument("--write", action="store_true", help=f"add a row to benchmarks/{RESULTS}")
     found = parser.parse_args()
     if not 0.0 < found.share <= 1.0 or found.processes < 1:
         parser.error("--share is over 0 and at most 1, --processes at least 1")
-    report = report_of(
-        "identify", lambda: measured(found.out, found.share, found.processes), smoke=False
-    )
+    if found.minutes is not None and found.minutes <= 0.0:
+        parser.error("--minutes is over 0")
+
+    def share() -> Measurement:
+        return measured(found.out, found.share, found.processes, found.minutes)
+
+    try:
+        report = report_of("identify", share, smoke=False)
+    except RiposteError as error:
+        print(f"benchmarks.identify: {error}", file=sys.stderr)
+        return 2
     print(text_of(report))
+    if found.write:
+        words = [word for word in sys.argv[1:] if word != "--write"]
+        add_row(ROOT / "benchmarks" / RESULTS, report, shlex.join(
+            ["python", "-m", "benchmarks.identify", *words, "--write"]
+        ))  # fmt: skip
     return 0
 
 

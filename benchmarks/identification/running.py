@@ -6,6 +6,7 @@ import os
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 from benchmarks.identification.baselines import baselines
 from benchmarks.identification.judging import record_of
 from benchmarks.identification.protocol import Trial
+from shared.clock import SystemClock
 from shared.errors import RiposteError
 from shared.identification.find import identify
 from shared.identification.hidden.generator import hide
@@ -38,20 +40,28 @@ def finished(path: Path) -> list[dict[str, Any]]:
 
 
 def run(
-    trials: Sequence[Trial], path: Path, baselines_every: int, processes: int = PROCESSES
+    trials: Sequence[Trial],
+    path: Path,
+    baselines_every: int,
+    processes: int = PROCESSES,
+    minutes: float | None = None,
 ) -> list[dict[str, Any]]:
-    """Return the records of all trials, those done before included.
+    """Return the records of all trials that are done, those done before included.
+
+    Cells take turns, so that what is cut short says something of each.
 
     Args:
         trials: what is to be done.
         path: of the file, JSON lines.
         baselines_every: on every so many data sets the baselines run, too; 0: on none.
         processes: how many at once.
+        minutes: after which no trial is begun; None for as long as it takes.
     """
+    ends_at = None if minutes is None else SystemClock().now() + 60.0 * minutes
     done = {record["key"] for record in finished(path)}
     left = [
-        (trial, bool(baselines_every) and number % baselines_every == 0)
-        for number, trial in enumerate(trials)
+        (trial, bool(baselines_every) and number % baselines_every == 0, ends_at)
+        for number, trial in enumerate(by_turns(trials))
         if trial.key not in done
     ]
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -59,6 +69,8 @@ def run(
     context = multiprocessing.get_context("spawn")
     with path.open("a", encoding="utf-8") as file, context.Pool(processes) as pool:
         for number, record in enumerate(pool.imap_unordered(one, left), 1):
+            if record is None:
+                continue
             file.write(json.dumps(record) + "\n")
             file.flush()
             print(f"{number}/{len(left)} {record['key']}: {_said(record)}", file=sys.stderr)
@@ -66,9 +78,22 @@ def run(
     return [record for record in finished(path) if record["key"] in wanted]
 
 
-def one(job: tuple[Trial, bool]) -> dict[str, Any]:
-    """Make a data set, let the finder look at it, and return the record."""
-    trial, with_baselines = job
+def by_turns(trials: Sequence[Trial]) -> list[Trial]:
+    """Return the trials so that each cell is spread evenly over all of them."""
+    counts = Counter(trial.cell for trial in trials)
+    seen: Counter[str] = Counter()
+    places: list[float] = []
+    for trial in trials:
+        places.append((seen[trial.cell] + 0.5) / counts[trial.cell])
+        seen[trial.cell] += 1
+    return [trials[index] for index in sorted(range(len(trials)), key=lambda one: places[one])]
+
+
+def one(job: tuple[Trial, bool, float | None]) -> dict[str, Any] | None:
+    """Make a data set, let the finder look at it, and return the record; None when time is up."""
+    trial, with_baselines, ends_at = job
+    if ends_at is not None and SystemClock().now() > ends_at:
+        return None
     with tempfile.TemporaryDirectory() as folder:
         data, steps = Path(folder) / "data", Path(folder) / "steps"
         steps.mkdir()

@@ -4,7 +4,7 @@ import pytest
 
 from benchmarks.identification.judging import judged
 from benchmarks.identification.protocol import FIRST_SEED, protocol
-from benchmarks.identification.running import finished
+from benchmarks.identification.running import by_turns, finished, run
 from benchmarks.identification.table import checks_of, confusion, wilson
 from shared.sim.hidden.effect import hidden_effects
 
@@ -59,6 +59,22 @@ def test_an_interval_covers_or_does_not():
     assert judged(record(hidden=hidden, named=[cause("payload")])).covered == (True,)
     missed = cause("payload", value=1.2, low=1.1, high=1.3)
     assert judged(record(hidden=hidden, named=[missed])).covered == (False,)
+
+
+def test_cells_take_turns_in_what_is_cut_short():
+    ordered = by_turns(protocol(0.05))
+    assert sorted(each.key for each in ordered) == sorted(each.key for each in protocol(0.05))
+    half = [each.cell for each in ordered[: len(ordered) // 2]]
+    assert half.count("null") in (2, 3)  # of five
+    assert half.count("two") in (1, 2)  # of three
+    assert len(half) / 2 < half.count("single") < len(half)
+
+
+def test_no_trial_is_begun_after_the_time_is_up(tmp_path):
+    path = tmp_path / "records.jsonl"
+    path.write_text(json.dumps(record(key=protocol(0.05)[3].key)) + "\n")
+    found = run(protocol(0.05), path, 0, processes=1, minutes=0.0)
+    assert [each["key"] for each in found] == [protocol(0.05)[3].key]
 
 
 def test_rates_of_the_table_are_those_of_the_records():
