@@ -50,7 +50,7 @@ def base_parameters(subject: Subject) -> tuple[BaseParameter, ...]:
     """Return the parameters of a subject; what its model has not (no friction) is none."""
     found: list[BaseParameter] = []
     model = subject.nominal.model
-    for label in subject.joints:
+    for joint, label in enumerate(subject.joints):
         dof = int(model.joint(subject.plant.mj_joint(label)).dofadr[0])
         for field, word, unit in (
             ("dof_damping", "damping", "N m s/rad"),
@@ -58,7 +58,9 @@ def base_parameters(subject: Subject) -> tuple[BaseParameter, ...]:
         ):
             nominal = float(getattr(model, field)[dof])
             if nominal > 0.0:
-                found.append(_factor(f"{word} {label}", unit, nominal, _LOOSE, _setter(field, dof)))
+                found.append(
+                    _factor(f"{word} {label}", unit, nominal, _LOOSE, _setter(field, joint))
+                )
         if (friction := _friction_scale(subject, dof)) > 0.0:
             nominal = float(model.dof_frictionloss[dof])
             found.append(
@@ -71,7 +73,7 @@ def base_parameters(subject: Subject) -> tuple[BaseParameter, ...]:
                     low=-nominal / friction,
                     high=5.0,
                     prior=_LOOSE,
-                    change=_setter("dof_frictionloss", dof),
+                    change=_setter("dof_frictionloss", joint),
                 )
             )
     found += _gains(subject)
@@ -92,9 +94,11 @@ def _factor(
     return BaseParameter(name, unit, nominal, True, 1.0, -4.0, 4.0, prior, change)
 
 
-def _setter(field: str, index: int) -> Callable[[Row, float], None]:
+def _setter(field: str, joint: int) -> Callable[[Row, float], None]:
+    """Return what sets a field of a logged joint, wherever added joints have moved it."""
+
     def change(row: Row, value: float) -> None:
-        row.field(field)[index] = value
+        row.field(field)[row.dofs[joint]] = value
 
     return change
 

@@ -22,13 +22,13 @@ _MOST_OF_TOOL = 0.5
 """Of the tool's mass, and of the smallest armature for its inertia, the same."""
 
 
-def centre(row: Row, dofs: np.ndarray) -> None:
+def centre(row: Row) -> None:
     """Take the damping of an arm's joints and of its pose controller in the middle of a step.
 
     Args:
         row: the arm, with everything in it that changes damping, gains and inertia.
-        dofs: int[J], velocities of the logged joints.
     """
+    dofs = row.dofs
     half = 0.5 * row.plant.timestep
     armature = row.field("dof_armature")
     wanted = half * row.current("dof_damping")[dofs]

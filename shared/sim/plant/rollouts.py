@@ -116,7 +116,7 @@ class Rollouts:
         rows = [self._row(index, entry, recorded) for index, (entry, recorded) in enumerate(work)]
         if self.plant.control == "pose":
             for row in rows:
-                centre(row, self._dofs)
+                centre(row)
         self._restore(rows)
         ids = np.arange(len(rows))
         self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
@@ -178,6 +178,7 @@ class Rollouts:
             plant=self.plant,
             model=self.model,
             index=index,
+            dofs=self._dofs,
             command=recorded.command,
             logged_q=recorded.logged_q,
             duration=last,

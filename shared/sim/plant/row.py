@@ -92,6 +92,8 @@ class Row:
     model: mujoco.MjModel
     """Of the batch: names, sizes and nominal values; never changed."""
     index: int
+    dofs: np.ndarray
+    """int[J], where the velocities of the logged joints are in the model."""
     command: Signal
     """Replace it to change what reaches the controller; instants are the log's (s)."""
     logged_q: Signal
@@ -146,7 +148,7 @@ class Row:
 
     def dof(self, label: str) -> int:
         """Return the index of a logged joint's velocity in the model."""
-        return int(self.model.joint(self.plant.mj_joint(label)).dofadr[0])
+        return int(self.dofs[self.plant.labels.index(label)])
 
     def mj_joint(self, name: str) -> int:
         """Return the index of a joint of the MJCF, added ones included."""

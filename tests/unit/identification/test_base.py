@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from shared.identification.base import base_parameters, enter_base
+from shared.identification.catalogue.joint_elasticity import EFFECT as ELASTICITY
 from shared.identification.subject import Subject
 from shared.sim.plant.plant import mjcf
+from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.row import Row
 from tests.arms import JOINTS, make_plant, make_subject, recorded, write_arm
 
@@ -53,6 +55,18 @@ def test_values_go_where_they_belong(subject: Subject):
     fore = model.body("fore").id
     assert row.field("body_mass")[fore] == pytest.approx(0.5 * factor)
     assert row.field("body_inertia")[fore] == pytest.approx(factor * model.body_inertia[fore])
+
+
+def test_values_go_to_their_joint_also_behind_one_that_an_effect_added(subject: Subject):
+    bends = Rollouts(subject.plant, ELASTICITY.structure(subject, "pan"), 1)
+    damping = next(each for each in base_parameters(subject) if each.name == "damping elbow")
+    row = bends.entered(
+        lambda row: enter_base((damping,), np.ones(1), row), recorded(_COMMAND, 0.1)
+    )
+    dofs = {name: int(bends.model.joint(name).dofadr[0]) for name in (*JOINTS, "pan/series")}
+    assert dofs["elbow"] == 3  # 2 in the arm as it is
+    changed = row.fields["dof_damping"] != bends.model.dof_damping
+    assert changed.nonzero()[0].tolist() == [dofs["elbow"]]
 
 
 def test_a_base_that_was_entered_leaves_no_trace(subject: Subject):
