@@ -15,7 +15,7 @@ _MEDIAN = 0.455
 """Of the square of a normal number of variance 1."""
 WINDOW = 1.0
 """Of the parts that a fit begins with (s)."""
-_ENOUGH = 3e-3
+_ENOUGH = 1e-3
 """A step that takes off less than this share of the cost is the last one."""
 _DAMPINGS = (1e-3, 1e-1, 1.0, 100.0)
 """Factors of Marquardt's damping that are tried at once."""
