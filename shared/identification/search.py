@@ -284,13 +284,8 @@ def _simplest(useful: list[Tried], rng: np.random.Generator) -> tuple[Tried, tup
 
 
 def _is_alike(best: Tried, other: Tried, rng: np.random.Generator) -> bool:
-    """Return whether the held-out recordings do not prefer the best surely.
-
-    More numbers than another has must be worth them: the 95 % interval says so.
-    """
+    """Return whether the held-out recordings do not prefer the best surely."""
     margin = compare(other.losses, best.losses, rng)
-    if other.numbers < best.numbers and margin.low <= 0.0:
-        return True
     return margin.gain < max(margin.error, ALIKE * best.gain.gain)
 
 
