@@ -56,7 +56,7 @@ def measured(
     records = run(trials, path, every, processes, minutes)
     first, *others = checks_of(records)
     if not first.name.startswith("right effect"):
-        raise RiposteError(f"no data set with one effect was done in {minutes:g} minutes")
+        raise RiposteError(f"no data set with one effect was done, of {len(records)}")
     others.append(Check(name=f"data sets done, of {len(trials)}", value=float(len(records))))
     print(confusion_text(records), file=sys.stderr)
     names = {check.name: check for check in others}

@@ -23,10 +23,9 @@ def effort_of(subject: Subject, of: Trajectory, at: Float64) -> Float64:
         return sampled(of.joints_at, of.effort, at)
     if subject.control == "torque":
         return _commanded(subject, of, at)
-    motion = motion_of(of)
-    q, qd, qdd = motion.q[::_SPARSE], motion.qd[::_SPARSE], motion.qdd[::_SPARSE]
-    torque = inverse_dynamics(subject.plant, subject.nominal.model, q, qd, qdd)
-    return sampled(motion.at[::_SPARSE], torque, at)
+    motion = motion_of(of).sparse(_SPARSE)
+    torque = inverse_dynamics(subject.plant, subject.nominal.model, motion.q, motion.qd, motion.qdd)
+    return sampled(motion.at, torque, at)
 
 
 def _commanded(subject: Subject, of: Trajectory, at: Float64) -> Float64:

@@ -42,6 +42,16 @@ class Fit:
     """Half the sum of squares."""
     starts_agree: bool = True
 
+    @staticmethod
+    def of(space: Space, z: Float64, residual: Float64, jacobian: Float64) -> "Fit":
+        """Return a fit with its cost."""
+        return Fit(space, z, residual, jacobian, 0.5 * float(residual @ residual))
+
+    @staticmethod
+    def at(space: Space, z: Float64, segments: tuple[int, ...]) -> "Fit":
+        """Return a vector as it is, with the derivative there."""
+        return Fit.of(space, z, *space.jacobian(z, segments))
+
 
 def polish(
     space: Space,
@@ -64,13 +74,12 @@ def polish(
         known: residual and derivative at the start, if they are known.
     """
     z = space.clip(start)
-    residual, jacobian = space.jacobian(z, segments) if known is None else known
-    fit = Fit(space, z, residual, jacobian, 0.5 * float(residual @ residual))
+    fit = Fit.at(space, z, segments) if known is None else Fit.of(space, z, *known)
     for _ in range(steps):
         found = go_down(fit, segments)
         if not found.cost < fit.cost * (1 - enough):
             break
-        fit = _at(space, found.z, segments)
+        fit = Fit.at(space, found.z, segments)
     return fit
 
 
@@ -181,14 +190,9 @@ def fit_again(space: Space, saved: SavedFits) -> BaseFits:
     parts = Space(problem.in_parts(WINDOW), space.candidates)
     origin, pieces = np.zeros(space.size), parts.problem.of("train")
     nominal = Start(origin, parts.jacobian(origin, pieces)[1])
-    begun = _at(parts, np.array(saved.parts), pieces)
-    whole = _at(space, np.array(saved.whole), problem.of("train"))
+    begun = Fit.at(parts, np.array(saved.parts), pieces)
+    whole = Fit.at(space, np.array(saved.whole), problem.of("train"))
     return BaseFits(nominal, begun, replace(whole, starts_agree=saved.starts_agree), whole.z)
-
-
-def _at(space: Space, z: Float64, segments: tuple[int, ...]) -> Fit:
-    residual, jacobian = space.jacobian(z, segments)
-    return Fit(space, z, residual, jacobian, 0.5 * float(residual @ residual))
 
 
 def fit_base(space: Space, rng: np.random.Generator) -> BaseFits:

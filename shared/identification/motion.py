@@ -26,6 +26,10 @@ class Motion:
     at: Float64
     """float64[T] (s)."""
 
+    def sparse(self, every: int) -> "Motion":
+        """Return one in so many of the instants."""
+        return Motion(self.q[::every], self.qd[::every], self.qdd[::every], self.at[::every])
+
 
 def motion_of(trajectory: Trajectory) -> Motion:
     """Return a recording's motion from local fits of a cubic (Savitzky and Golay 1964).

@@ -36,13 +36,17 @@ def width_of(period: float, cut: Cut) -> int:
     return max(round(cut.smooth / period) // 2 * 2 + 1, 7)
 
 
-def starts_of(trajectory: Trajectory, cut: Cut) -> Float64:
-    """Return when parts begin; none where the recording is too short to be cut (s)."""
+def spans_of(trajectory: Trajectory, cut: Cut) -> Float64:
+    """Return float64[P, 2], when parts begin and end; none of a recording too short to be cut (s).
+
+    Each ends where the next one begins: no reading is of two parts.
+    """
     at, period = trajectory.joints_at, _period(trajectory)
     width = width_of(period, cut)
     if len(_even(trajectory)) <= 2 * width:
-        return np.zeros(0)
-    return np.arange(at[0] + width * period, at[-1] - 0.5 * cut.length, cut.length)
+        return np.zeros((0, 2))
+    begins = np.arange(at[0] + width * period, at[-1] - 0.5 * cut.length, cut.length)
+    return np.stack([begins, np.r_[begins[1:], begins[-1:] + cut.length]], axis=1)
 
 
 def states_of(
@@ -51,7 +55,7 @@ def states_of(
     """Return positions and speeds at instants, from a local fit of the positions.
 
     Args:
-        trajectory: the recording, longer than :func:`starts_of` needs.
+        trajectory: the recording, longer than :func:`spans_of` needs.
         instants: when (s).
         timestep: of the physics that goes on from there (s).
         cut: says how many readings a fit is of.

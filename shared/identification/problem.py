@@ -161,11 +161,15 @@ class Problem:
             return joints, None
         return joints, pose_error(logged.tracker, reports.tracker)
 
+    def in_floors(self, joints: Float64, segment: int) -> Float64:
+        """Return block means of a segment's joint residuals, float64[B, J], in noise floors."""
+        return self.noise.floors(joints, self._whitening[segment])
+
     def whitened(self, reports: Reports, segment: int) -> Float64:
         """Return the residuals of one segment in noise floors, as :meth:`residuals` does."""
         joints, tracker = self.raw(reports, segment)
         of_joints, of_tracker = self._bins[segment]
-        out = self.noise.floors(of_joints.mean(joints), self._whitening[segment])
+        out = self.in_floors(of_joints.mean(joints), segment)
         if tracker is not None and of_tracker is not None and self.noise.tracker is not None:
             more = of_tracker.mean(tracker) / self.noise.tracker
             rows = min(len(out), len(more))

@@ -110,12 +110,8 @@ def _descend(
     base[:rows] = kept[:, :known]
     base[rows : rows + known] = np.diag(1.0 / space.priors[:known])
     jacobian = np.concatenate([base, own], axis=1)
-    down = go_down(_fit(space, z, residual, jacobian), segments, _DAMPINGS)
+    down = go_down(Fit.of(space, z, residual, jacobian), segments, _DAMPINGS)
     return down.z, down.cost
-
-
-def _fit(space: Space, z: Float64, residual: Float64, jacobian: Float64) -> Fit:
-    return Fit(space, z, residual, jacobian, 0.5 * float(residual @ residual))
 
 
 def settle(space: Space, start: Float64, segments: tuple[int, ...]) -> Fit:
@@ -123,10 +119,8 @@ def settle(space: Space, start: Float64, segments: tuple[int, ...]) -> Fit:
 
     Twice, where the second derivative still finds something.
     """
-    z = space.clip(start)
-    before = _fit(space, z, *space.jacobian(z, segments))
+    before = Fit.at(space, space.clip(start), segments)
     found = go_down(before, segments, _DAMPINGS)
     if found.cost > before.cost * (1 - _ENOUGH):
         return found
-    again = _fit(space, found.z, *space.jacobian(found.z, segments))
-    return go_down(again, segments, _DAMPINGS)
+    return go_down(Fit.at(space, found.z, segments), segments, _DAMPINGS)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shared.identification.dataset.types import Dataset, Float64, Trajectory
-from shared.identification.parts import CUT, CUTS, Cut, part_of, starts_of, states_of
+from shared.identification.parts import CUT, CUTS, Cut, part_of, spans_of, states_of
 from shared.identification.subject import Subject
 from shared.sim.plant.rollouts import Recorded
 
@@ -55,15 +55,14 @@ def segments_of(
 def _segments(
     index: int, trajectory: Trajectory, cut: Cut | None, timestep: float
 ) -> list[Segment]:
-    begins = np.zeros(0) if cut is None else starts_of(trajectory, cut)
-    if cut is None or not len(begins):
+    spans = np.zeros((0, 2)) if cut is None else spans_of(trajectory, cut)
+    if cut is None or not len(spans):
         known = (trajectory.initial_q, trajectory.initial_qd)
         return [_segment(index, trajectory, 0.0, np.inf, known)]
-    ends = np.r_[begins[1:], begins[-1:] + cut.length]  # no reading is of two parts
-    states = states_of(trajectory, begins, timestep, cut)
+    states = states_of(trajectory, spans[:, 0], timestep, cut)
     return [
         _segment(index, trajectory, float(begin), float(end), state)
-        for begin, end, state in zip(begins, ends, states, strict=True)
+        for (begin, end), state in zip(spans, states, strict=True)
     ]
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shared.identification.dataset.types import Float64, Trajectory
-from shared.identification.parts import Cut, part_of, starts_of, states_of
+from shared.identification.parts import Cut, part_of, spans_of, states_of
 from shared.sim.plant.rollouts import Recorded, Reports, Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import pose_error
@@ -75,18 +75,14 @@ class _Pair:
 
 
 def _parts(first: Trajectory, second: Trajectory, cut: Cut, nominal: Rollouts) -> Iterable[_Pair]:
-    begins = starts_of(first, cut)
-    begins = begins[begins < second.joints_at[-1]] if len(starts_of(second, cut)) else begins[:0]
-    if not len(begins):
+    spans = spans_of(first, cut)
+    spans = spans[spans[:, 0] < second.joints_at[-1]]
+    if not len(spans) or not len(spans_of(second, cut)):
         return
-    ends = np.r_[begins[1:], begins[-1:] + cut.length]
-    timestep = nominal.plant.timestep
-    states = zip(
-        states_of(first, begins, timestep, cut),
-        states_of(second, begins, timestep, cut),
-        strict=True,
+    ones, others = (
+        states_of(each, spans[:, 0], nominal.plant.timestep, cut) for each in (first, second)
     )
-    for begin, end, (one, other) in zip(begins, ends, states, strict=True):
+    for (begin, end), one, other in zip(spans, ones, others, strict=True):
         part, joints, tracker = part_of(first, float(begin), float(end), one)
         yield _Pair(part, part_of(second, float(begin), float(end), other)[0], joints, tracker)
 

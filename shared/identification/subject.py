@@ -116,11 +116,10 @@ def subject_of(dataset: Dataset, capacity: int = 128) -> Subject:
     speeds = np.concatenate([each.qd for each in motions])
     drives = np.concatenate(
         [
-            inverse_dynamics(plant, nominal.model, each.q[::_SPARSE], each.qd[::_SPARSE],
-                             each.qdd[::_SPARSE])
-            for each in motions
+            inverse_dynamics(plant, nominal.model, each.q, each.qd, each.qdd)
+            for each in (motion.sparse(_SPARSE) for motion in motions)
         ]
-    )  # fmt: skip
+    )
     return Subject(
         plant=plant,
         nominal=nominal,

@@ -99,10 +99,9 @@ def missing_of(problem: Problem, variant: Variant, track: Track) -> Float64:
 def _missing(row: Row, of: Trajectory, begin: float, wanted: Float64) -> Float64:
     motion = motion_of(of)
     every = max(round(BLOCK / float(np.median(np.diff(motion.at)))), 1)
-    at, q, qd, qdd = (
-        each[::every] for each in (motion.at, motion.q, motion.qd, motion.qdd)
-    )  # fmt: skip
-    return sampled(at, missing_torque(row, at - begin, q, qd, qdd), wanted)
+    motion = motion.sparse(every)
+    torque = missing_torque(row, motion.at - begin, motion.q, motion.qd, motion.qdd)
+    return sampled(motion.at, torque, wanted)
 
 
 def _track(
@@ -138,9 +137,8 @@ def _joints(problem: Problem, segment: int, reports: Reports) -> tuple[Float64, 
     """Return instants and joint residuals of a segment's blocks."""
     recorded = problem.segments[segment].recorded
     at = recorded.joints_at - recorded.joints_at[0]
-    logged = problem.segments[segment].q
-    whiten = problem.noise.whitening(problem.subject.nominal, block_means(at, logged, BLOCK))
-    x = problem.noise.floors(block_means(at, logged - reports.q, BLOCK), whiten)
+    off = block_means(at, problem.segments[segment].q - reports.q, BLOCK)
+    x = problem.in_floors(off, segment)
     middles = block_means(at, recorded.joints_at[:, None], BLOCK)[:, 0]
     if recorded.begin > 0.0:
         spread = _spread(at, middles, CUTS.get(problem.subject.control, CUT))

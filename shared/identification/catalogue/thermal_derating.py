@@ -94,8 +94,7 @@ def _heat_before(row: Row, place: str) -> float:
         row.model.actuator_gear[drive, 0] if drive in row.drives_of(place) else 0.0
         for drive in drives
     ]
-    torque = row.command.values[before] @ np.asarray(gears)
-    return float(np.sum(np.square(torque) * spans * np.exp(at / MEMORY)))
+    return _heat(at, spans, row.command.values[before] @ np.asarray(gears))
 
 
 def _heat_of_motion(row: Row, joint: int) -> float:
@@ -103,12 +102,14 @@ def _heat_of_motion(row: Row, joint: int) -> float:
     before = row.logged_q.at < 0.0
     if before.sum() < _FEWEST:
         return 0.0
-    motion = smooth_motion(row.logged_q.at[before], row.logged_q.values[before])
-    at, q, qd, qdd = (
-        each[::_SPARSE] for each in (motion.at, motion.q, motion.qd, motion.qdd)
-    )  # fmt: skip
-    torque = inverse_dynamics(row.plant, row.model, q, qd, qdd)[:, joint]
-    spans = np.gradient(at) if len(at) > 1 else np.zeros(1)
+    motion = smooth_motion(row.logged_q.at[before], row.logged_q.values[before]).sparse(_SPARSE)
+    torque = inverse_dynamics(row.plant, row.model, motion.q, motion.qd, motion.qdd)
+    spans = np.gradient(motion.at) if len(motion.at) > 1 else np.zeros(1)
+    return _heat(motion.at, spans, torque[:, joint])
+
+
+def _heat(at: Float64, spans: Float64, torque: Float64) -> float:
+    """Return what is left at time 0 of the heat of torques that each lasted for a span."""
     return float(np.sum(np.square(torque) * spans * np.exp(at / MEMORY)))
 
 

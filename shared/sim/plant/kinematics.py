@@ -33,12 +33,11 @@ def tool_motion(plant: Plant, model: mujoco.MjModel, q: Float64) -> tuple[Float6
     in the frame of the poses, which no logged joint moves.
     """
     at = _moved(plant, model, q)
-    joints = np.array([int(model.joint(name).id) for name in plant.joints])
-    slides = model.jnt_type[joints] == int(mujoco.mjtJoint.mjJNT_SLIDE)
+    slides = model.jnt_type[at.joints] == int(mujoco.mjtJoint.mjJNT_SLIDE)
     lever = at.tool[:, None, :3] - at.anchors
     turning = np.where(slides[:, None], 0.0, at.axes)
     moving = np.where(slides[:, None], at.axes, cross(at.axes, lever))
-    is_above = np.array([_carries(model, int(model.jnt_bodyid[one]), at.body) for one in joints])
+    is_above = np.array([_carries(model, int(model.jnt_bodyid[one]), at.body) for one in at.joints])
     jacobian = np.concatenate([moving, turning], axis=2) * is_above[:, None]
     if at.base is None:
         return at.tool, jacobian.swapaxes(1, 2)
@@ -56,6 +55,8 @@ class _At:
     """float64[T, 7]."""
     base: Float64 | None
     """float64[T, 7], what the tool's pose is measured from; None is the world."""
+    joints: np.ndarray
+    """int[J], the logged ones in the model."""
     anchors: Float64
     """float64[T, J, 3], of the logged joints (m)."""
     axes: Float64
@@ -89,6 +90,7 @@ def _moved(plant: Plant, model: mujoco.MjModel, q: Float64) -> _At:
     return _At(
         tool=tool.seen(frames[:, 0]),
         base=None if base is None else base.seen(frames[:, 1]),
+        joints=joints,
         anchors=kept[2][:, joints],
         axes=kept[3][:, joints],
         body=tool.body,
