@@ -75,9 +75,11 @@ class ExternalContact:
         torque, begin, length = (float(value) for value in values)
         if trajectory != row.trajectory or torque == 0.0 or length <= 0.0:
             return
+        begin -= row.begin
+        if begin >= row.duration or begin + length <= 0.0:  # of a part of the recording
+            return
         torques = np.zeros(len(row.plant.labels))
         torques[row.plant.labels.index(joint)] = torque
-        begin -= row.begin
         row.torque(_PUSH, np.concatenate([[begin, begin + length], torques]))
 
 

@@ -1,7 +1,7 @@
 """Many arms at once, each with a model, a command and reports of its own."""
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -56,6 +56,20 @@ class Reports:
     """float64[K, 7]."""
 
 
+@dataclass(frozen=True)
+class _Motion:
+    """How one arm moved."""
+
+    times: Float64
+    """float64[S + 1], ends of steps and their begin (s)."""
+    q: Float64
+    """float64[S + 1, J]."""
+    tool: Float64 | None
+    """float64[S, 7], before each step."""
+    is_bad: bool
+    """Whether the physics diverged."""
+
+
 _Law = TypeVar("_Law", TorqueLaw, FrictionLaw)
 
 Entry = Callable[[Row], None]
@@ -102,18 +116,34 @@ class Rollouts:
         self._tool = slice(adr, adr + 7)
 
     def run(self, work: Sequence[tuple[Entry, Recorded]]) -> list[Reports]:
-        """Replay recordings, each on an arm of its own; any number of them."""
-        # A batch goes on until its longest recording ends, so alike ones go together.
-        order = sorted(range(len(work)), key=lambda index: float(work[index][1].joints_at[-1]))
+        """Replay recordings, each on an arm of its own; any number of them.
+
+        Arms that move alike, since they differ in nothing or only in what is reported of them, are
+        simulated once.
+        """
+        rows = [self._entered(entry, recorded) for entry, recorded in work]
+        alike: dict[Hashable, list[int]] = defaultdict(list)
+        for index, (row, (_, recorded)) in enumerate(zip(rows, work, strict=True)):
+            alike[_motion_of(row, recorded)].append(index)
+        # A batch goes on until its longest recording ends and asks for torques at each step if one
+        # of its arms has a law, so alike ones go together.
+        groups = sorted(
+            alike.values(),
+            key=lambda group: (rows[group[0]].has_laws, float(work[group[0]][1].joints_at[-1])),
+        )
         found: dict[int, Reports] = {}
-        for begin in range(0, len(work), self.capacity):
-            picked = order[begin : begin + self.capacity]
-            made = self._run([work[index] for index in picked])
-            found.update(zip(picked, made, strict=True))
+        for begin in range(0, len(groups), self.capacity):
+            picked = groups[begin : begin + self.capacity]
+            moved = self._run([(rows[group[0]], work[group[0]][1]) for group in picked])
+            for group, motion in zip(picked, moved, strict=True):
+                for index in group:
+                    found[index] = self._reports(rows[index], work[index][1], motion)
         return [found[index] for index in range(len(work))]
 
-    def _run(self, work: Sequence[tuple[Entry, Recorded]]) -> list[Reports]:
-        rows = [self._row(index, entry, recorded) for index, (entry, recorded) in enumerate(work)]
+    def _run(self, work: Sequence[tuple[Row, Recorded]]) -> "list[_Motion]":
+        rows = [self._commanded(row) for row, _ in work]
+        for index, row in enumerate(rows):
+            row.index = index
         if self.plant.control == "pose":
             for row in rows:
                 centre(row)
@@ -161,23 +191,27 @@ class Rollouts:
         times: Float64 = timestep * np.arange(steps + 1, dtype=np.float64)
         is_bad = self._batch.warning[ids].reshape(len(ids), -1).any(axis=1)
         return [
-            self._reports(row, recorded, times, q[row.index],
-                          None if tool is None else tool[row.index, :-1], bool(is_bad[row.index]))
-            for row, (_, recorded) in zip(rows, work, strict=True)
-        ]  # fmt: skip
+            _Motion(
+                times,
+                q[row.index],
+                None if tool is None else tool[row.index, :-1],
+                bool(is_bad[row.index]),
+            )
+            for row in rows
+        ]
 
     def entered(self, entry: Entry, recorded: Recorded) -> Row:
         """Return an arm with base parameters and effects in it, for those who look what changed."""
-        return self._row(0, entry, recorded)
+        return self._commanded(self._entered(entry, recorded))
 
-    def _row(self, index: int, entry: Entry, recorded: Recorded) -> Row:
+    def _entered(self, entry: Entry, recorded: Recorded) -> Row:
         last = float(recorded.joints_at[-1])
         if recorded.tracker_at is not None:
             last = max(last, float(recorded.tracker_at[-1]))
         row = Row(
             plant=self.plant,
             model=self.model,
-            index=index,
+            index=0,
             dofs=self._dofs,
             command=recorded.command,
             logged_q=recorded.logged_q,
@@ -189,9 +223,13 @@ class Rollouts:
             initial_qd=recorded.initial_qd,
         )
         entry(row)
+        return row
+
+    def _commanded(self, row: Row) -> Row:
+        """Return an arm whose command is what reaches its servos."""
         known = self.plant.command
         if not known.is_direct:
-            row.command = filtered(row.command.later(known.delay), known.filter, last)
+            row.command = filtered(row.command.later(known.delay), known.filter, row.duration)
         for change in row.target_changes:
             row.command = change(row.command)
         return row
@@ -281,23 +319,22 @@ class Rollouts:
             rubs[joints] = constant
         return q, tool
 
-    def _reports(
-        self, row: Row, recorded: Recorded, times: Float64, q: Float64, tool: Float64 | None,
-        is_bad: bool,
-    ) -> Reports:  # fmt: skip
-        joints = JointsReport(recorded.joints_at, sampled(times, q, recorded.joints_at))
+    def _reports(self, row: Row, recorded: Recorded, motion: "_Motion") -> Reports:
+        q = sampled(motion.times, motion.q, recorded.joints_at)
+        joints = JointsReport(recorded.joints_at, q)
         for change in row.joints_reports:
             change(joints)
-        if is_bad:
+        if motion.is_bad:
             joints.q = np.full_like(joints.q, np.nan)
-        if recorded.tracker_at is None or tool is None:
+        if recorded.tracker_at is None or motion.tool is None:
             return Reports(joints.q, None)
         at = recorded.tracker_at
         at = at if row.tracker_time is None else row.tracker_time(at)
-        report = TrackerReport(recorded.tracker_at, self._seen(row, times[:-1], tool, at))
+        seen = self._seen(row, motion.times[:-1], motion.tool, at)
+        report = TrackerReport(recorded.tracker_at, seen)
         for change in row.tracker_reports:
             change(report)
-        if is_bad:
+        if motion.is_bad:
             report.pose = np.full_like(report.pose, np.nan)
         return Reports(joints.q, report.pose)
 
@@ -316,6 +353,21 @@ def _controls(model: mujoco.MjModel, actuator: int) -> np.ndarray:
     """Return which of the model's controls are an actuator's."""
     first = int(model.actuator_ctrladr[actuator])
     return np.arange(first, first + int(model.actuator_ctrlnum[actuator]))
+
+
+def _motion_of(row: Row, recorded: Recorded) -> Hashable:
+    """Return what is equal for arms that move alike; nobody's equal where that cannot be told."""
+    if row.target_changes or row.rests or row.fed:
+        return id(row)
+    return (
+        id(recorded),
+        id(row.command),
+        row.initial_q.tobytes(),
+        row.initial_qd.tobytes(),
+        tuple(sorted((name, values.tobytes()) for name, values in row.fields.items())),
+        tuple((id(law), values.tobytes()) for law, values in (*row.laws, *row.frictions)),
+        tuple(sorted(row.weights.items())),
+    )
 
 
 @dataclass

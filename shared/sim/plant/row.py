@@ -92,6 +92,7 @@ class Row:
     model: mujoco.MjModel
     """Of the batch: names, sizes and nominal values; never changed."""
     index: int
+    """In the batch, from when it is in one."""
     dofs: np.ndarray
     """int[J], where the velocities of the logged joints are in the model."""
     command: Signal
@@ -134,6 +135,11 @@ class Row:
     weights: dict[int, float] = dataclasses.field(default_factory=dict[int, float])
     """Weight (N) by body, of what nothing balances on an arm that is weightless otherwise."""
     fields: dict[str, Float64] = dataclasses.field(default_factory=dict[str, Float64])
+
+    @property
+    def has_laws(self) -> bool:
+        """Return whether something has to be asked at each step what it does to the arm."""
+        return bool(self.laws or self.frictions)
 
     def field(self, name: str) -> Float64:
         """Return a field of this arm's own model, to be changed in place."""
