@@ -100,8 +100,21 @@ def part_of(
         else None,
         trajectory=trajectory.name,
         begin=begin,
+        logged_tracker=tracker_of(trajectory, begin),
     )
     return recorded, joints, tracker
+
+
+def tracker_of(trajectory: Trajectory, begin: float = 0.0) -> Signal | None:
+    """Return what a tracker logged, if one did.
+
+    Args:
+        trajectory: the recording.
+        begin: what its instants are counted from (s).
+    """
+    if trajectory.tracker_at is None or trajectory.tracker is None:
+        return None
+    return Signal(trajectory.tracker_at - begin, trajectory.tracker)
 
 
 def _period(trajectory: Trajectory) -> float:

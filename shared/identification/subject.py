@@ -9,7 +9,7 @@ import numpy as np
 from shared.errors import IdentificationError
 from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource, Trajectory
 from shared.identification.motion import motion_of
-from shared.identification.parts import CUTS
+from shared.identification.parts import CUTS, tracker_of
 from shared.identification.ripples import ripples_of
 from shared.identification.slips import slip_of
 from shared.identification.starts import Starts, starts_apart
@@ -151,6 +151,7 @@ def _replayed(recordings: Sequence[Trajectory]) -> tuple[Recorded, ...]:
             tracker_at=each.tracker_at,
             trajectory=each.name,
             earlier=tuple(other.name for other in recordings[:index]),
+            logged_tracker=tracker_of(each),
         )
         for index, each in enumerate(recordings)
     )

@@ -5,9 +5,16 @@ import numpy as np
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
 from shared.identification.places import moving, place_of
-from shared.identification.series import hide_from_controller, link_inertia, series
+from shared.identification.series import (
+    bent_by_load,
+    hide_from_controller,
+    link_inertia,
+    seen_by_tracker,
+    series,
+)
 from shared.identification.subject import Subject
 from shared.sim.plant.row import Row
+from shared.sim.plant.signals import Signal, sampled
 from shared.sim.plant.structure import Structure, series_name
 
 _PART = "gap"
@@ -40,7 +47,7 @@ class Backlash:
         return series(subject, place, _PART)
 
     def enter(self, row: Row, place: str, values: Float64) -> None:
-        """Open the gap; the link starts on the flank that carries it."""
+        """Open the gap; the link starts where a tracker sees it, or else on the loaded flank."""
         half = 0.5 * float(values[0])
         if half <= 0.0:
             return
@@ -55,8 +62,18 @@ class Backlash:
         row.field("jnt_range")[joint] = -half, half
         row.field("jnt_solref")[joint] = 2.0 * row.plant.timestep, 1.0
         row.field("jnt_solimp")[joint, :2] = 0.999, 0.9999
-        row.rest(name, lambda load: -half * float(np.sign(load)))
-        hide_from_controller(row, place, lambda load: -half * np.sign(load))
+        seen = seen_by_tracker(row, place)
+        if seen is None:
+            row.rest(name, lambda load: -half * float(np.sign(load)))
+            hide_from_controller(
+                row, place, lambda: bent_by_load(row, place, lambda load: -half * np.sign(load))
+            )
+            return
+        # Where the load is near zero, what is seen says on which flank the link lies.
+        off = Signal(seen.at, np.clip(seen.values, -half, half))
+        begin = float(sampled(off.at, off.values, np.zeros(1))[0, 0])
+        row.rest(name, lambda _: begin)
+        hide_from_controller(row, place, lambda: off)
 
 
 EFFECT = Backlash()

@@ -44,6 +44,8 @@ class Recorded:
     """How far into the recording time 0 is (s)."""
     earlier: tuple[str, ...] = ()
     """Names of the recordings made before it."""
+    logged_tracker: Signal | None = None
+    """float64[C, 7] poses, of the whole recording."""
 
 
 @dataclass(frozen=True)
@@ -215,6 +217,7 @@ class Rollouts:
             dofs=self._dofs,
             command=recorded.command,
             logged_q=recorded.logged_q,
+            logged_tracker=recorded.logged_tracker,
             duration=last,
             trajectory=recorded.trajectory,
             begin=recorded.begin,

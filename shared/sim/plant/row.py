@@ -99,6 +99,8 @@ class Row:
     """Replace it to change what reaches the controller; instants are the log's (s)."""
     logged_q: Signal
     """What the robot logged, for effects on how commands were understood."""
+    logged_tracker: Signal | None
+    """What a tracker logged, poses by its own clock; None without one."""
     duration: float
     """(s)."""
     trajectory: str
