@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from shared.identification.again import fresh, leave_out
+from shared.identification.begin import begin
 from shared.identification.catalogue import effects
 from shared.identification.conclude import Conclusion, conclude, extended, is_open
 from shared.identification.dataset.types import Dataset
@@ -18,7 +19,7 @@ from shared.identification.leftover import leftovers
 from shared.identification.problem import BLOCK, Variant
 from shared.identification.progress import Progress, silent
 from shared.identification.saved import load, save
-from shared.identification.search import Search, begin, search
+from shared.identification.search import Search, search
 from shared.identification.verdict import Unexplained, Verdict
 from shared.runtime.build import commit
 from shared.runtime.service import version

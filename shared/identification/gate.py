@@ -66,13 +66,14 @@ class Gain:
         explainable = base - floor_of(base)
         return min(self.low / explainable, 1.0), min(self.high / explainable, 1.0)
 
+    @property
+    def is_sure(self) -> bool:
+        """Return whether it is surely better, and by enough of what was left before."""
+        return self.surely > 0.0 and self.gain >= LEAST_GAIN * self.before
+
     def is_useful(self, base: float) -> bool:
         """Return whether it passes: surely better, and by enough."""
-        return (
-            self.surely > 0.0
-            and self.share(base) >= LEAST_SHARE
-            and self.gain >= LEAST_GAIN * self.before
-        )
+        return self.is_sure and self.share(base) >= LEAST_SHARE
 
 
 def stretches(problem: Problem, variant: Variant, segments: tuple[int, ...]) -> Float64:

@@ -1,33 +1,27 @@
-"""Searches for causes: fits, looks, tries, and judges each on what was held out."""
+"""Searches for causes: looks, tries, and judges each on what was held out."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from shared.identification.base import INERTIA_PRIOR, base_parameters
-from shared.identification.dataset.types import Dataset, Float64
-from shared.identification.effect import Candidate, Effect
+from shared.identification.dataset.types import Float64
+from shared.identification.effect import Candidate
+from shared.identification.family import Family, look_elsewhere, relatives
 from shared.identification.fit import (
     Fit,
-    SavedFits,
     Start,
-    fit_again,
-    fit_base,
-    fit_without,
-    floor_from_base,
     polish,
 )
-from shared.identification.gate import Gain, compare, stretches
-from shared.identification.noise import noise_of
-from shared.identification.problem import BLOCK, Problem
+from shared.identification.gate import LEAST_SHARE, Gain, compare, floor_of, stretches
+from shared.identification.problem import Problem
 from shared.identification.progress import Progress
 from shared.identification.refit import Rough, refit, settle
-from shared.identification.screen import Screened, candidates_of, screen
+from shared.identification.screen import Screened, screen
 from shared.identification.space import Space
-from shared.identification.subject import subject_of
 
 MOST_CAUSES = 4
+"""Rounds; each names one cause, and what is like it at other joints."""
 _TRIED = 6
 """Candidates that are refitted with the base's derivative kept."""
 _FULL = 4
@@ -42,8 +36,6 @@ _FAR = 2.0
 """Candidates whose rough refit costs so many times the best one's get no full fit."""
 QUIET = 1.25
 """Mean square residual, in noise floors, below which no further cause is looked for."""
-FAR_FROM_KNOWN = 3.0
-"""Standard deviations from what is known of a link at which the base itself is doubted."""
 _ONCE = "external_contact"
 _STANDS_OUT = 8.0
 """Mean square residual of a stretch over the usual one, where something happened once."""
@@ -64,6 +56,8 @@ class Tried:
     """float64[S] of held-out stretches."""
     is_event: bool = False
     """Whether it happened once, in a recording that was fitted to, and explains what stood out."""
+    is_relative: bool = False
+    """Whether it was found at a joint because most others have it."""
 
     @property
     def candidate(self) -> Candidate:
@@ -105,92 +99,29 @@ class Search:
     """For each accepted cause, what the data do not tell from it."""
 
 
-def begin(
-    dataset: Dataset,
-    *,
-    seed: int,
-    progress: Progress,
-    without: frozenset[str],
-    catalogue: Sequence[Effect],
-    fits: SavedFits | None = None,
-) -> Search:
-    """Return a search with its base fitted.
-
-    Args:
-        dataset: the recordings.
-        seed: of everything random.
-        progress: is told how far it is.
-        without: effects to leave out, by name.
-        catalogue: what is looked for.
-        fits: the base's fit, if it was found before.
-
-    Raises:
-        IdentificationError: the model does not fit the recordings.
-    """
-    rng = np.random.default_rng(seed)  # of the base fit, which may have been done before
-    progress("noise floor", 0.0)
-    subject = subject_of(dataset)
-    noise = noise_of(dataset, BLOCK, subject.starts, subject.nominal)
-    released = known = base_parameters(subject)
-    if fits is not None and not {each.name for each in known} >= set(fits.names):
-        fits = None
-    problem = Problem(subject, dataset, known, noise)
-    if not noise.is_measured:
-        progress("noise floor", 0.5, "no repeats: from what the base leaves")
-        noise = floor_from_base(Space(problem))
-    if fits is not None:
-        known = tuple(each for each in known if each.name in fits.names)
-    problem = Problem(subject, dataset, known, noise)
-    progress("base fit", 0.0, f"{len(known)} parameters" + ("" if fits is None else ", kept"))
-    space = Space(problem)
-    done = fit_base(space, rng) if fits is None else fit_again(space, fits)
-    if fits is None and (doubted := _doubted(done.whole)):
-        # What is known of a link does not hold, so the base may not bend it: what is wrong there
-        # is looked for like any other cause.
-        progress("base fit", 0.5, f"without {', '.join(known[index].name for index in doubted)}")
-        kept = tuple(each for index, each in enumerate(known) if index not in doubted)
-        problem = Problem(subject, dataset, kept, noise)
-        space = Space(problem)
-        done = fit_without(space, done, doubted)
-    test = problem.of("test")
-    nominal = stretches(problem, space.variant(np.zeros(space.size)), test)
-    losses = stretches(problem, space.variant(done.whole.z), test)
-    candidates, ruled_out = candidates_of(catalogue, subject, without)
-    return Search(
-        problem=problem,
-        rng=np.random.default_rng([seed, 1]),
-        candidates=candidates,
-        ruled_out=ruled_out,
-        doubted=tuple(each.name for each in released if each not in problem.parameters),
-        base=done.whole,
-        nominal=done.nominal,
-        parts=done.parts,
-        current=done.whole,
-        nominal_losses=nominal,
-        base_losses=losses,
-        current_losses=losses,
-    )
-
-
-def _doubted(fit: Fit) -> list[int]:
-    """Return which parameters a fit bends further than what is known of them allows."""
-    return [
-        index
-        for index, (each, z) in enumerate(zip(fit.space.problem.parameters, fit.z, strict=True))
-        if each.prior == INERTIA_PRIOR and abs(z) > FAR_FROM_KNOWN * INERTIA_PRIOR
-    ]
-
-
 def search(found: Search, progress: Progress) -> None:
     """Look for causes, one after another, until none passes or one is not told from others."""
     train, test = found.problem.of("train"), found.problem.of("test")
     for _ in range(MOST_CAUSES):
-        is_floor = found.problem.noise.is_measured
-        is_done = found.accepted and is_floor and found.current_losses.mean() < QUIET
-        if is_done or not _round(found, train, test, progress):
+        is_over = found.accepted and _is_over(found)
+        if is_over or not _round(found, train, test, progress):
             break
     if len(found.accepted) > 1:
         _prune(found, train, test)
+
+
+def _is_over(found: Search) -> bool:
+    """Return whether nothing is left that a cause could be named for.
+
+    It is not told from noise, or all of it is less than what a cause must take off to be of use.
+    """
+    left, base = float(found.current_losses.mean()), float(found.base_losses.mean())
+    return left < LEAST_SHARE * (base - floor_of(base)) or _is_quiet(found, found.current_losses)
+
+
+def _is_quiet(found: Search, losses: Float64) -> bool:
+    """Return whether held-out losses float64[S] are not told from noise, where it was measured."""
+    return found.problem.noise.is_measured and bool(losses.mean() < QUIET)
 
 
 def _round(
@@ -236,17 +167,65 @@ def _round(
     gain = compare(found.current_losses, losses, found.rng)
     if gain.loss <= best.gain.loss and (best.is_event or gain.is_useful(base)):
         best = Tried(best.screened, fit, gain, losses, best.is_event)
+    best, rivals, family = _elsewhere(found, best, rivals, train, test, progress)
     found.accepted.append(best)
     found.rivals.append(rivals)
     found.current, found.current_losses = best.fit, best.losses
+    if family is not None:
+        _join(found, family)
     if rivals:
         return False
     if found.parts.space.problem is found.problem:
         found.parts = found.current
     else:
-        space = Space(found.parts.space.problem, best.fit.space.candidates)
-        found.parts = polish(space, best.fit.z, parts, 2)
+        space = Space(found.parts.space.problem, found.current.space.candidates)
+        found.parts = polish(space, found.current.z, parts, 2)
     return True
+
+
+def _elsewhere(
+    found: Search, best: Tried, rivals: tuple[Tried, ...], train: tuple[int, ...],
+    test: tuple[int, ...], progress: Progress,
+) -> tuple[Tried, tuple[Tried, ...], Family | None]:  # fmt: skip
+    """Look at other joints for the cause to be taken, and for those that are not told from it.
+
+    Returns:
+        The cause to take, its rivals, and what is like it at other joints, which may tell it from
+        what were its rivals.
+    """
+    if _is_quiet(found, best.losses):
+        return best, rivals, None
+    families: list[tuple[Tried, Family]] = []
+    for one in (best, *rivals):
+        others = relatives(found.candidates, one.candidate, one.fit)
+        if not others:
+            continue
+        progress("refit", 1.0, f"{one.candidate.effect.name} at {len(others)} other joints")
+        family = look_elsewhere(one.fit, others, one.losses, train, test, found.rng)
+        if family is not None:
+            families.append((one, family))
+    if not families:
+        return best, rivals, None
+    taken, family = min(families, key=lambda each: float(each[1].losses.mean()))
+    after = {one.candidate: one.losses for one in (best, *rivals)}
+    after |= {one.candidate: other.losses for one, other in families}
+    left = tuple(
+        one
+        for one in (best, *rivals)
+        if one is not taken
+        and compare(after[one.candidate], family.losses, found.rng).surely <= 0.0
+    )
+    return (best, rivals, None) if left else (taken, (), family)
+
+
+def _join(found: Search, family: Family) -> None:
+    """Take what was found at other joints."""
+    for candidate, gain in family.gains.items():
+        screened = found.screened[candidate.label]
+        found.accepted.append(Tried(screened, family.fit, gain, family.losses, is_relative=True))
+        found.tried[candidate.label] = found.accepted[-1]
+        found.rivals.append(())
+    found.current, found.current_losses = family.fit, family.losses
 
 
 def _explains_event(found: Search, candidate: Candidate, fit: Fit, train: tuple[int, ...]) -> bool:
@@ -323,26 +302,15 @@ def _diverse(screened: Sequence[Screened]) -> list[Screened]:
 def _prune(found: Search, train: tuple[int, ...], test: tuple[int, ...]) -> None:
     """Take back causes without which the rest does as well."""
     base = float(found.base_losses.mean())
-    for each in [one for one in found.accepted[:-1] if not one.is_event]:
+    doubtful = [one for one in found.accepted[:-1] if not one.is_event and not one.is_relative]
+    for each in doubtful:
         kept = [other for other in found.accepted if other is not each]
         space = Space(found.problem, tuple(other.candidate for other in kept))
         full = found.current.space
-        z = _without(full, found.current.z, each.candidate)
+        z = np.delete(found.current.z, full.where(each.candidate))
         fit = polish(space, z, train, 2)
         losses = stretches(found.problem, space.variant(fit.z), test)
         if not compare(losses, found.current_losses, found.rng).is_useful(base):
             index = found.accepted.index(each)
             del found.accepted[index], found.rivals[index]
             found.current, found.current_losses = fit, losses
-
-
-def _without(space: Space, z: Float64, candidate: Candidate) -> Float64:
-    """Return a vector without an effect's numbers."""
-    begin = space.base_size
-    keep = list(range(begin))
-    for each in space.candidates:
-        size = len(each.effect.quantities(space.problem.subject, each.place))
-        if each != candidate:
-            keep += range(begin, begin + size)
-        begin += size
-    return z[keep]

@@ -64,11 +64,16 @@ def label(cause: Cause) -> str:
 
 
 def _named(causes: tuple[Cause, ...]) -> str:
-    return " and ".join(f"{cause.title}{_where(cause)} ({_size(cause)})" for cause in causes)
+    """Return causes in words, with all the joints of one effect together."""
+    places: dict[str, list[str]] = {}
+    for cause in causes:
+        where = f"at {cause.where} " if cause.where else ""
+        places.setdefault(cause.title, []).append(f"{where}({_size(cause)})")
+    return " and ".join(f"{title} {_listed(each)}" for title, each in places.items())
 
 
-def _where(cause: Cause) -> str:
-    return f" at {cause.where}" if cause.where else ""
+def _listed(words: list[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def _size(cause: Cause) -> str:

@@ -77,6 +77,16 @@ class Space:
         """Return each effect's numbers in their own units."""
         return tuple(values for _, values in self.variant(z).extras)
 
+    def where(self, candidate: Candidate) -> slice:
+        """Return which of the vector's numbers are an effect's."""
+        begin = self.base_size
+        for each in self.candidates:
+            end = begin + len(each.effect.quantities(self.problem.subject, each.place))
+            if each == candidate:
+                return slice(begin, end)
+            begin = end
+        raise ValueError(f"{candidate.label} is not fitted")
+
     def clip(self, z: Float64) -> Float64:
         """Return the vector within bounds."""
         return np.clip(z, *self.bounds)

@@ -7,11 +7,12 @@ import msgspec
 import numpy as np
 import pytest
 
+from shared.identification.begin import begin
 from shared.identification.catalogue.viscous_friction import EFFECT as VISCOUS
 from shared.identification.dataset.types import Dataset
 from shared.identification.progress import silent
 from shared.identification.saved import FILE, SCHEMA, load, save
-from shared.identification.search import Search, begin, search
+from shared.identification.search import Search, search
 from shared.sim.plant.row import Row
 from tests.measured import measure
 from tests.searches import Searches

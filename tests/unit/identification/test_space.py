@@ -7,7 +7,6 @@ from shared.identification.catalogue.torque_bias import EFFECT as BIAS
 from shared.identification.catalogue.viscous_friction import EFFECT as VISCOUS
 from shared.identification.effect import Candidate
 from shared.identification.problem import Problem
-from shared.identification.search import _without  # pyright: ignore[reportPrivateUsage]
 from shared.identification.space import Space
 from tests.measured import measure, problem_of
 
@@ -37,8 +36,11 @@ def test_an_effects_numbers_are_dropped_from_a_vector(problem: Problem):
     candidates = tuple(Candidate(BIAS, joint) for joint in ("pan", "lift", "elbow"))
     space = Space(problem, candidates)
     n = len(problem.parameters)
-    z = np.arange(n + 3.0)
-    assert _without(space, z, candidates[1]).tolist() == [*range(n), n, n + 2]
+    assert [space.where(each) for each in candidates] == [
+        slice(n + index, n + index + 1) for index in range(3)
+    ]
+    with pytest.raises(ValueError, match="viscous_friction pan is not fitted"):
+        space.where(Candidate(VISCOUS, "pan"))
 
 
 def test_a_derivative_is_what_a_small_step_changes(problem: Problem):

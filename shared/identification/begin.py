@@ -1,0 +1,104 @@
+"""Begins a search: what the noise is, and the base fitted without any cause."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shared.identification.base import INERTIA_PRIOR, base_parameters
+from shared.identification.dataset.types import Dataset
+from shared.identification.effect import Effect
+from shared.identification.fit import (
+    Fit,
+    SavedFits,
+    fit_again,
+    fit_base,
+    fit_without,
+    floor_from_base,
+)
+from shared.identification.gate import stretches
+from shared.identification.noise import noise_of
+from shared.identification.problem import BLOCK, Problem
+from shared.identification.progress import Progress
+from shared.identification.screen import candidates_of
+from shared.identification.search import Search
+from shared.identification.space import Space
+from shared.identification.subject import subject_of
+
+FAR_FROM_KNOWN = 3.0
+"""Standard deviations from what is known of a link at which the base itself is doubted."""
+
+
+def begin(
+    dataset: Dataset,
+    *,
+    seed: int,
+    progress: Progress,
+    without: frozenset[str],
+    catalogue: Sequence[Effect],
+    fits: SavedFits | None = None,
+) -> Search:
+    """Return a search with its base fitted.
+
+    Args:
+        dataset: the recordings.
+        seed: of everything random.
+        progress: is told how far it is.
+        without: effects to leave out, by name.
+        catalogue: what is looked for.
+        fits: the base's fit, if it was found before.
+
+    Raises:
+        IdentificationError: the model does not fit the recordings.
+    """
+    rng = np.random.default_rng(seed)  # of the base fit, which may have been done before
+    progress("noise floor", 0.0)
+    subject = subject_of(dataset)
+    noise = noise_of(dataset, BLOCK, subject.starts, subject.nominal)
+    released = known = base_parameters(subject)
+    if fits is not None and not {each.name for each in known} >= set(fits.names):
+        fits = None
+    problem = Problem(subject, dataset, known, noise)
+    if not noise.is_measured:
+        progress("noise floor", 0.5, "no repeats: from what the base leaves")
+        noise = floor_from_base(Space(problem))
+    if fits is not None:
+        known = tuple(each for each in known if each.name in fits.names)
+    problem = Problem(subject, dataset, known, noise)
+    progress("base fit", 0.0, f"{len(known)} parameters" + ("" if fits is None else ", kept"))
+    space = Space(problem)
+    done = fit_base(space, rng) if fits is None else fit_again(space, fits)
+    if fits is None and (doubted := _doubted(done.whole)):
+        # What is known of a link does not hold, so the base may not bend it: what is wrong there
+        # is looked for like any other cause.
+        progress("base fit", 0.5, f"without {', '.join(known[index].name for index in doubted)}")
+        kept = tuple(each for index, each in enumerate(known) if index not in doubted)
+        problem = Problem(subject, dataset, kept, noise)
+        space = Space(problem)
+        done = fit_without(space, done, doubted)
+    test = problem.of("test")
+    nominal = stretches(problem, space.variant(np.zeros(space.size)), test)
+    losses = stretches(problem, space.variant(done.whole.z), test)
+    candidates, ruled_out = candidates_of(catalogue, subject, without)
+    return Search(
+        problem=problem,
+        rng=np.random.default_rng([seed, 1]),
+        candidates=candidates,
+        ruled_out=ruled_out,
+        doubted=tuple(each.name for each in released if each not in problem.parameters),
+        base=done.whole,
+        nominal=done.nominal,
+        parts=done.parts,
+        current=done.whole,
+        nominal_losses=nominal,
+        base_losses=losses,
+        current_losses=losses,
+    )
+
+
+def _doubted(fit: Fit) -> list[int]:
+    """Return which parameters a fit bends further than what is known of them allows."""
+    return [
+        index
+        for index, (each, z) in enumerate(zip(fit.space.problem.parameters, fit.z, strict=True))
+        if each.prior == INERTIA_PRIOR and abs(z) > FAR_FROM_KNOWN * INERTIA_PRIOR
+    ]
