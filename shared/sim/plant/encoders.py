@@ -1,8 +1,13 @@
 """A joint whose encoder is not right: the log and the controller believe what it says."""
 
+import functools
+
 from shared.sim.plant.row import JointsReport, Row
 from shared.sim.plant.signals import Signal
 from shared.sim.plant.targets import as_if_at
+
+_KEPT = 512
+"""Recordings, or parts of them, of which it is kept where the joints were."""
 
 
 def misread(row: Row, label: str, scale: float, offset: float) -> None:
@@ -34,11 +39,13 @@ def misread(row: Row, label: str, scale: float, offset: float) -> None:
     if row.plant.control != "pose":
         return
     believed = row.logged_q
-    true = believed.values.copy()
-    true[:, joint] = (true[:, joint] - offset) / scale
-    row.logged_q = Signal(believed.at, true)
+    true = row.logged_q = _true(believed, joint, scale, offset)
+    row.on_target(lambda target: as_if_at(row, target, believed, true))
 
-    def follow(target: Signal) -> Signal:
-        return as_if_at(row, target, believed, Signal(believed.at, true))
 
-    row.on_target(follow)
+@functools.lru_cache(_KEPT)
+def _true(believed: Signal, joint: int, scale: float, offset: float) -> Signal:
+    """Return where the joints are that an encoder has elsewhere."""
+    values = believed.values.copy()
+    values[:, joint] = (values[:, joint] - offset) / scale
+    return Signal(believed.at, values)

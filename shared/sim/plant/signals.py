@@ -11,9 +11,9 @@ POSE = 7
 """Numbers of a pose: position (m) and quaternion (w, x, y, z)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Signal:
-    """Values that each hold from their instant to the next."""
+    """Values that each hold from their instant to the next; equal to itself alone."""
 
     at: Float64
     """float64[C] (s), rising."""

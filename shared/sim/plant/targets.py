@@ -1,9 +1,13 @@
 """What a controller of poses does whose kinematics are of another posture than the arm's."""
 
+import functools
+
+import mujoco
 import numpy as np
 
 from shared.sim.arm import Float64
 from shared.sim.plant.kinematics import tool_motion
+from shared.sim.plant.plant import Plant
 from shared.sim.plant.poses import conjugate, product, rotation_vectors, turn
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal, sampled
@@ -12,6 +16,8 @@ _PERIOD = 0.01
 """Of the instants at which kinematics are taken (s)."""
 _NEAR = 0.02
 """Either side of an instant that a velocity is taken over (s)."""
+_KEPT = 512
+"""Recordings, or parts of them, of which kinematics are kept: 50 kB each."""
 _FIRM = 1e-6
 """Keeps a wrench finite where the arm is singular (m^2/(kg m^2))."""
 
@@ -29,11 +35,11 @@ def as_if_at(row: Row, target: Signal, believed: Signal, true: Signal) -> Signal
         row: the arm.
         target: float64[C, 7] poses that the controller compares with.
         believed: float64[T, J], the logged joints as the controller sees them (rad, m).
-        true: float64[T, J], the same as they are.
+        true: float64[T, J], the same as they are; give the same object for the same joints.
     """
-    at: Float64 = np.arange(0.0, row.duration + 2.0 * _PERIOD, _PERIOD, dtype=np.float64)
-    seen, seen_jacobian, seen_speed = _tool(row, believed, at)
-    tool, jacobian, speed = _tool(row, true, at)
+    at = _instants(row.duration)
+    seen, seen_jacobian, seen_speed = _tool(row.plant, row.model, believed, row.duration)
+    tool, jacobian, speed = _tool(row.plant, row.model, true, row.duration)
     stiffness, damping = _gains(row)
     given = _mean(target, at)
     asked = stiffness * _way(seen, given) - damping * seen_speed
@@ -75,12 +81,24 @@ def _moved(start: Float64, way: Float64) -> Float64:
     return np.concatenate([start[:, :3] + way[:, :3], turned], axis=1)
 
 
-def _tool(row: Row, joints: Signal, at: Float64) -> tuple[Float64, Float64, Float64]:
-    """Return the tool's pose float64[T, 7], Jacobian and velocity float64[T, 6]."""
+def _instants(until: float) -> Float64:
+    """Return float64[T], at which kinematics are taken (s)."""
+    return np.arange(0.0, until + 2.0 * _PERIOD, _PERIOD, dtype=np.float64)
+
+
+@functools.lru_cache(_KEPT)
+def _tool(
+    plant: Plant, model: mujoco.MjModel, joints: Signal, until: float
+) -> tuple[Float64, Float64, Float64]:
+    """Return the tool's pose float64[T, 7], Jacobian and velocity float64[T, 6].
+
+    Kept, since variants that differ in something else ask for the same.
+    """
+    at = _instants(until)
     q = sampled(joints.at, joints.values, at)
     ahead = sampled(joints.at, joints.values, at + _NEAR)
     behind = sampled(joints.at, joints.values, at - _NEAR)
-    pose, jacobian = tool_motion(row.plant, row.model, q)
+    pose, jacobian = tool_motion(plant, model, q)
     speed = np.einsum("tij,tj->ti", jacobian, (ahead - behind) / (2.0 * _NEAR))
     return pose, jacobian, speed
 
