@@ -5,6 +5,7 @@ stands, and ends with the report. ``--serial`` runs the same services in one pro
 """
 
 import contextlib
+import dataclasses
 import os
 import sys
 import threading
@@ -116,6 +117,10 @@ def _conclude(folder: Path) -> int:
 # -- many processes ---------------------------------------------------------------------------
 
 
+LATER = ("nice", "-n", "5")
+"""What a run does not wait for yields the cores to what it does: its imports take 2 CPU seconds."""
+
+
 def processes(settings: Settings, folder: Path, run: str, endpoint: str) -> list[ProcessSpec]:
     """Return the processes of a run on this machine, in the order they are started."""
 
@@ -132,7 +137,8 @@ def processes(settings: Settings, folder: Path, run: str, endpoint: str) -> list
     made += [spec("learner", f"learner-{agent}", agent=agent) for agent in AGENTS]
     made += [spec("actor", f"actor-{index}") for index in range(settings.train.actors)]
     if settings.train.record:
-        made.append(spec("recorder", "recorder-0"))
+        recorder = spec("recorder", "recorder-0")
+        made.append(dataclasses.replace(recorder, argv=(*LATER, *recorder.argv)))
     return made
 
 
