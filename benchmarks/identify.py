@@ -38,8 +38,9 @@ def default_path() -> Path:
 
 
 def measured(
-    path: Path, share: float, processes: int = PROCESSES, minutes: float | None = None
-) -> Measurement:
+    path: Path, share: float, processes: int = PROCESSES, minutes: float | None = None,
+    baselines_every: int = BASELINES_EVERY,
+) -> Measurement:  # fmt: skip
     """Run a share of the protocol, or go on with it; 0 is the smoke test.
 
     Args:
@@ -47,12 +48,13 @@ def measured(
         share: of the protocol's numbers.
         processes: how many at once.
         minutes: after which no data set is begun; None for as long as it takes.
+        baselines_every: on every so many data sets the baselines run, too; 0: on none.
 
     Raises:
         RiposteError: no single effect was looked for in that time.
     """
     trials = protocol(share) if share else smoke()
-    every = BASELINES_EVERY if share else 0
+    every = baselines_every if share else 0
     records = run(trials, path, every, processes, minutes)
     first, *others = checks_of(records)
     if not first.name.startswith("right effect"):
@@ -79,15 +81,23 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=default_path(), help="JSON lines (%(default)s)")
     parser.add_argument("--processes", type=int, default=PROCESSES, help="at once (%(default)s)")
     parser.add_argument("--minutes", type=float, help="after which no data set is begun")
+    parser.add_argument(
+        "--baselines-every", type=int, default=BASELINES_EVERY, metavar="N",
+        help="data sets; slow on a PR2, 0 for none (%(default)s)",
+    )  # fmt: skip
     parser.add_argument("--write", action="store_true", help=f"add a row to benchmarks/{RESULTS}")
     found = parser.parse_args()
     if not 0.0 < found.share <= 1.0 or found.processes < 1:
         parser.error("--share is over 0 and at most 1, --processes at least 1")
     if found.minutes is not None and found.minutes <= 0.0:
         parser.error("--minutes is over 0")
+    if found.baselines_every < 0:
+        parser.error("--baselines-every is at least 0")
 
     def share() -> Measurement:
-        return measured(found.out, found.share, found.processes, found.minutes)
+        return measured(
+            found.out, found.share, found.processes, found.minutes, found.baselines_every
+        )
 
     try:
         report = report_of("identify", share, smoke=False)

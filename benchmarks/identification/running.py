@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from benchmarks.identification.baselines import baselines
 from benchmarks.identification.judging import record_of
 from benchmarks.identification.protocol import Trial
@@ -79,10 +81,15 @@ def run(
 
 
 def by_turns(trials: Sequence[Trial]) -> list[Trial]:
-    """Return the trials so that each cell is spread evenly over all of them."""
+    """Return the trials so that each cell is spread evenly over all of them.
+
+    Within a cell they are shuffled, always alike: what is cut short is of every effect and arm.
+    """
     counts = Counter(trial.cell for trial in trials)
     seen: Counter[str] = Counter()
     places: list[float] = []
+    order = np.random.default_rng(0).permutation(len(trials))
+    trials = [trials[index] for index in order]
     for trial in trials:
         places.append((seen[trial.cell] + 0.5) / counts[trial.cell])
         seen[trial.cell] += 1

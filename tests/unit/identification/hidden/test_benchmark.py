@@ -70,6 +70,12 @@ def test_cells_take_turns_in_what_is_cut_short():
     assert len(half) / 2 < half.count("single") < len(half)
 
 
+def test_what_is_cut_short_is_of_many_effects_and_both_arms():
+    singles = [each for each in by_turns(protocol()) if each.cell == "single"][:40]
+    assert len({each.recipe.wishes[0].name for each in singles}) > 20
+    assert {each.recipe.arm for each in singles} >= {"pr2", "arm3"}
+
+
 def test_no_trial_is_begun_after_the_time_is_up(tmp_path):
     path = tmp_path / "records.jsonl"
     path.write_text(json.dumps(record(key=protocol(0.05)[3].key)) + "\n")
