@@ -7,7 +7,6 @@ import numpy as np
 
 from shared.identification.cmaes import minimize
 from shared.identification.dataset.types import Float64
-from shared.identification.huber import restored
 from shared.identification.noise import Noise
 from shared.identification.space import Space
 
@@ -36,7 +35,7 @@ class Fit:
     z: Float64
     """float64[n]."""
     residual: Float64
-    """float64[M + n] on the recordings that were fitted to, tempered where noise was measured."""
+    """float64[M + n] on the recordings that were fitted to."""
     jacobian: Float64
     """float64[M + n, n]."""
     cost: float
@@ -52,19 +51,6 @@ class Fit:
     def at(space: Space, z: Float64, segments: tuple[int, ...]) -> "Fit":
         """Return a vector as it is, with the derivative there."""
         return Fit.of(space, z, *space.jacobian(z, segments))
-
-    def plain(self) -> "Fit":
-        """Return it with residuals as they are, where they are tempered."""
-        if not self.space.problem.noise.is_measured:
-            return self
-        rows = len(self.residual) - self.space.size
-        residual, jacobian = restored(self.residual[:rows], self.jacobian[:rows])
-        return Fit.of(
-            self.space,
-            self.z,
-            np.concatenate([residual, self.residual[rows:]]),
-            np.concatenate([jacobian, self.jacobian[rows:]]),
-        )
 
 
 def polish(

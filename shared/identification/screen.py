@@ -59,7 +59,6 @@ def candidates_of(
 def screen(fit: Fit, candidates: Sequence[Candidate], segments: tuple[int, ...]) -> list[Screened]:
     """Return every candidate that explains anything, best first."""
     problem, base = fit.space.problem, fit.space.variant(fit.z)
-    fit = fit.plain()  # sizes of an effect mix in proportion
     basis = np.linalg.qr(fit.jacobian)[0]
     left = fit.residual - basis @ (basis.T @ fit.residual)
     total = float(fit.residual @ fit.residual)

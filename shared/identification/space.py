@@ -6,7 +6,6 @@ import numpy as np
 
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate, Quantity
-from shared.identification.huber import tempered
 from shared.identification.problem import Problem, Variant
 
 _STEP = 0.02
@@ -96,13 +95,8 @@ class Space:
         return Space(self.problem, (*self.candidates, candidate))
 
     def residual(self, zs: list[Float64], segments: tuple[int, ...]) -> Float64:
-        """Return float64[V, M + n]: whitened residuals, and what speaks against leaving nominal.
-
-        Residuals are tempered where it is known from repeats what noise is.
-        """
+        """Return float64[V, M + n]: whitened residuals, and what speaks against leaving nominal."""
         found = self.problem.vector([self.variant(z) for z in zs], segments)
-        if self.problem.noise.is_measured:
-            found = tempered(found)
         prior = np.stack([z / self.priors for z in zs])
         return np.concatenate([found, prior], axis=1)
 
