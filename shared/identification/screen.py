@@ -59,7 +59,7 @@ def candidates_of(
 def screen(fit: Fit, candidates: Sequence[Candidate], segments: tuple[int, ...]) -> list[Screened]:
     """Return every candidate that explains anything, best first."""
     problem, base = fit.space.problem, fit.space.variant(fit.z)
-    basis = np.linalg.qr(fit.jacobian)[0]
+    basis, triangle = np.linalg.qr(fit.jacobian)
     left = fit.residual - basis @ (basis.T @ fit.residual)
     total = float(fit.residual @ fit.residual)
     variants: list[Variant] = []
@@ -76,7 +76,8 @@ def screen(fit: Fit, candidates: Sequence[Candidate], segments: tuple[int, ...])
     out: list[Screened] = []
     for candidate, begun in zip(candidates, looks, strict=True):
         tried = [
-            _judge(candidate, found[rows].T, look, basis, left, fit, total) for look, rows in begun
+            _judge(candidate, found[rows].T, look, basis, triangle, left, fit, total)
+            for look, rows in begun
         ]
         out.append(max(tried, key=lambda each: each.share))
     return sorted(out, key=lambda each: -each.share)
@@ -134,8 +135,8 @@ def _signatures(fit: Fit, variants: Sequence[Variant], segments: tuple[int, ...]
 
 
 def _judge(
-    candidate: Candidate, columns: Float64, look: _Look, basis: Float64, left: Float64, fit: Fit,
-    total: float,
+    candidate: Candidate, columns: Float64, look: _Look, basis: Float64, triangle: Float64,
+    left: Float64, fit: Fit, total: float,
 ) -> Screened:  # fmt: skip
     bare = columns - basis @ (basis.T @ columns)
     size = np.linalg.norm(bare, axis=0)
@@ -151,7 +152,7 @@ def _judge(
         best = np.clip(best, 1.0 / _NEAR, _NEAR)
     explained = bare @ best
     share = float(left @ left - (left + explained) @ (left + explained)) / max(total, 1e-12)
-    shift = least_squares(fit.jacobian, -(fit.residual + columns @ best))
+    shift = least_squares(triangle, -(basis.T @ (fit.residual + columns @ best)))
     direction = explained / max(float(np.linalg.norm(explained)), 1e-12)
     start = look.form.copy()
     start[list(look.sizes)] = scale if look.is_level else best * scale
