@@ -7,7 +7,6 @@ is the load: what the link takes of gravity and inertia.
 import functools
 from collections.abc import Callable
 
-import mujoco
 import numpy as np
 
 from shared.identification.dataset.types import Float64
@@ -15,7 +14,7 @@ from shared.identification.smoothing import smooth
 from shared.identification.subject import Subject
 from shared.sim.plant.inverse import inverse_dynamics
 from shared.sim.plant.kinematics import tool_motion
-from shared.sim.plant.plant import Plant
+from shared.sim.plant.plant import Model, Plant
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal, pose_error, sampled
 from shared.sim.plant.structure import JOINT_MOTORS, Builder, Edit, Structure
@@ -91,9 +90,7 @@ def bent_by_load(row: Row, label: str, bent: Callable[[Float64], Float64]) -> Si
 
 
 @functools.lru_cache(_KEPT)
-def _load(
-    plant: Plant, model: mujoco.MjModel, log: Signal, until: float
-) -> tuple[Float64, Float64]:
+def _load(plant: Plant, model: Model, log: Signal, until: float) -> tuple[Float64, Float64]:
     """Return instants, and the load of every link there: float64[T, J] (N m, N)."""
     logged = _near(log, until)
     at: Float64 = np.arange(float(logged.at[0]), float(logged.at[-1]), _PERIOD, dtype=np.float64)
@@ -123,7 +120,7 @@ def seen_by_tracker(row: Row, label: str) -> Signal | None:
 
 @functools.lru_cache(_KEPT)
 def _turn(
-    plant: Plant, model: mujoco.MjModel, log: Signal, tracker: Signal, joint: int, until: float
+    plant: Plant, model: Model, log: Signal, tracker: Signal, joint: int, until: float
 ) -> Signal | None:
     """Return the turn of a joint that a tracker saw and its encoder did not, float64[T, 1]."""
     seen = _near(tracker, until)

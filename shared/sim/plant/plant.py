@@ -17,6 +17,8 @@ from shared.sim.config import SimConfig
 from shared.sim.parameters import CommandParameters, load_parameters
 
 Control = Literal["pose", "position", "torque"]
+Model = mujoco.MjModel
+"""For those who pass one on and do not look into it."""
 TOOL = "riposte/tool"
 """Prefix of the sensors that say where the tracked site is."""
 BALANCE = "riposte/centred"
