@@ -26,7 +26,7 @@ def half_widths(fit: Fit, segments: tuple[int, ...]) -> Float64:
     """
     problem = fit.space.problem
     size = round(STRETCH / BLOCK)
-    bread = np.asarray(np.linalg.pinv(fit.jacobian.T @ fit.jacobian), np.float64)
+    bread = fit.spread
     scores: list[Float64] = []
     begin = 0
     for rows, channels in map(problem.shape_of, segments):

@@ -105,8 +105,7 @@ def _losses_without(fit: Fit, candidate: Candidate, test: tuple[int, ...]) -> Fl
     """
     space = fit.space
     own = space.where(candidate)
-    spread = np.linalg.pinv(fit.jacobian.T @ fit.jacobian, hermitian=True)
-    way = -spread[:, own] @ np.linalg.solve(spread[own, own], fit.z[own])
+    way = -fit.spread[:, own] @ np.linalg.solve(fit.spread[own, own], fit.z[own])
     found: list[Float64] = []
     for share in _WAYS:
         z = fit.z + share * way

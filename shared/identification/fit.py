@@ -1,5 +1,6 @@
 """Fits a space to recordings: CMA-ES as in the paper, then least squares from several starts."""
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -41,6 +42,11 @@ class Fit:
     cost: float
     """Half the sum of squares."""
     starts_agree: bool = True
+
+    @functools.cached_property
+    def spread(self) -> Float64:
+        """Return float64[n, n]: covariance of the vector, of white residuals of variance 1."""
+        return np.asarray(np.linalg.pinv(self.jacobian.T @ self.jacobian), np.float64)
 
     @staticmethod
     def of(space: Space, z: Float64, residual: Float64, jacobian: Float64) -> "Fit":

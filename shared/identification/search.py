@@ -8,11 +8,7 @@ import numpy as np
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
 from shared.identification.family import Family, look_elsewhere, relatives
-from shared.identification.fit import (
-    Fit,
-    Start,
-    polish,
-)
+from shared.identification.fit import Fit, Start, polish
 from shared.identification.gate import LEAST_SHARE, Gain, compare, floor_of, stretches
 from shared.identification.problem import Problem
 from shared.identification.progress import Progress
@@ -20,8 +16,8 @@ from shared.identification.refit import Rough, refit, settle
 from shared.identification.screen import Screened, screen
 from shared.identification.space import Space
 
-MOST_CAUSES = 4
-"""Rounds; each names one cause, and what is like it at other joints."""
+_ROUNDS = 4
+"""Each names one cause, and what is like it at other joints."""
 _TRIED = 6
 """Candidates that are refitted with the base's derivative kept."""
 _FULL = 4
@@ -102,7 +98,7 @@ class Search:
 def search(found: Search, progress: Progress) -> None:
     """Look for causes, one after another, until none passes or one is not told from others."""
     train, test = found.problem.of("train"), found.problem.of("test")
-    for _ in range(MOST_CAUSES):
+    for _ in range(_ROUNDS):
         is_over = found.accepted and _is_over(found)
         if is_over or not _round(found, train, test, progress):
             break

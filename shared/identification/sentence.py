@@ -1,6 +1,7 @@
 """Says in a sentence or two what a search comes to."""
 
 from shared.identification.verdict import Cause, HeldOut, Tie, Unexplained, Word
+from shared.telemetry.wording import listing
 
 
 def sentence_of(
@@ -69,11 +70,7 @@ def _named(causes: tuple[Cause, ...]) -> str:
     for cause in causes:
         where = f"at {cause.where} " if cause.where else ""
         places.setdefault(cause.title, []).append(f"{where}({_size(cause)})")
-    return " and ".join(f"{title} {_listed(each)}" for title, each in places.items())
-
-
-def _listed(words: list[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+    return " and ".join(f"{title} {listing(each)}" for title, each in places.items())
 
 
 def _size(cause: Cause) -> str:

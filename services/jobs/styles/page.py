@@ -20,6 +20,7 @@ from shared.styles.components import GOAL, KEPT
 from shared.telemetry import html
 from shared.telemetry.html import Html, Node, tag
 from shared.telemetry.style_figures import Part, StyleOf, component_panels, feature_panels
+from shared.telemetry.wording import listing
 
 MOST_TRIPLES = 10
 """Triples shown without being asked."""
@@ -102,7 +103,7 @@ def _head(summary: StylesSummary) -> Node:
         tag(
             "p",
             f"Of {len(summary.library)} protagonists, each seen in {bouts:,} bouts against "
-            f"{len(summary.opponents)} antagonists, {_listing(three.policies)} are the most "
+            f"{len(summary.opponents)} antagonists, {listing(three.policies)} are the most "
             "separable. With the warm start they make the bundle at the end of this page.",
             class_="lead",
         ),
@@ -323,10 +324,6 @@ def _bundle(summary: StylesSummary, bundle: Bundle) -> Node:
         html.table(("name", "what it is", "training seed", "SHA-256"), rows, numbers=(2,)),
         html.table(("", ""), facts),
     )
-
-
-def _listing(names: Sequence[str]) -> str:
-    return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _with_unit(feature: FeatureNote) -> str:

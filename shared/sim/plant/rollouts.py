@@ -3,7 +3,6 @@
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 import mujoco
 import mujoco.batch
@@ -13,8 +12,9 @@ from shared.sim.arm import Float64
 from shared.sim.model import silence
 from shared.sim.plant.centred import centre
 from shared.sim.plant.kinematics import tool_poses
+from shared.sim.plant.laws import Active, Rubbing, frictions_of, torques_of
 from shared.sim.plant.plant import TOOL, Plant
-from shared.sim.plant.row import FrictionLaw, JointsReport, Row, Step, TorqueLaw, TrackerReport
+from shared.sim.plant.row import JointsReport, Row, Step, TrackerReport
 from shared.sim.plant.signals import Signal, filtered, sampled, sampled_poses
 from shared.sim.plant.structure import JOINT_MOTORS, MOTOR, Structure, compiled
 
@@ -71,8 +71,6 @@ class _Motion:
     is_bad: bool
     """Whether the physics diverged."""
 
-
-_Law = TypeVar("_Law", TorqueLaw, FrictionLaw)
 
 Entry = Callable[[Row], None]
 """Lets base parameters and effects into one arm."""
@@ -169,7 +167,7 @@ class Rollouts:
         q = np.empty((len(rows), steps + 1, len(self._qpos)))
         tool = np.empty((len(rows), steps + 1, 7)) if wants_tool else None
         q[:, 0] = qpos[ids][:, self._qpos]
-        laws, frictions = _torques(rows), _frictions(rows)
+        laws, frictions = torques_of(rows), frictions_of(rows)
         has_laws = bool(laws or frictions)
         at: Float64 = timestep * np.arange(steps, dtype=np.float64)
         for begin in range(0, steps, _CHUNK):
@@ -275,8 +273,8 @@ class Rollouts:
         self,
         ids: np.ndarray,
         ctrl: Float64,
-        laws: "list[_Active]",
-        frictions: "list[_Rubbing]",
+        laws: list[Active],
+        frictions: list[Rubbing],
         begin: int,
     ) -> tuple[Float64, Float64]:
         batch = self._batch
@@ -311,7 +309,7 @@ class Rollouts:
                     drive_change=change[pick],
                     gravity=bias[pick],
                 )
-                if isinstance(active, _Rubbing):
+                if isinstance(active, Rubbing):
                     rubs[pick] += active.law(step, active.values)
                 else:
                     applied[pick] += active.law(step, active.values, active.memory)
@@ -371,53 +369,6 @@ def _motion_of(row: Row, recorded: Recorded) -> Hashable:
         tuple((id(law), values.tobytes()) for law, values in (*row.laws, *row.frictions)),
         tuple(sorted(row.weights.items())),
     )
-
-
-@dataclass
-class _Active:
-    law: TorqueLaw
-    rows: np.ndarray
-    values: Float64
-    memory: Float64
-
-
-@dataclass
-class _Rubbing:
-    law: FrictionLaw
-    rows: np.ndarray
-    values: Float64
-
-
-def _torques(rows: Sequence[Row]) -> list[_Active]:
-    """Return the torques at work, each with the arms that it acts on."""
-    return [
-        _Active(law, members, values, np.zeros((len(members), law.memory)))
-        for law, members, values in _by_law([(row.index, row.laws) for row in rows])
-    ]
-
-
-def _frictions(rows: Sequence[Row]) -> list[_Rubbing]:
-    """Return the frictions at work, each with the arms that it acts on."""
-    return [
-        _Rubbing(law, members, values)
-        for law, members, values in _by_law([(row.index, row.frictions) for row in rows])
-    ]
-
-
-def _by_law(
-    rows: Sequence[tuple[int, list[tuple[_Law, Float64]]]],
-) -> list[tuple[_Law, np.ndarray, Float64]]:
-    """Return each law with arms and values; several times if an arm has it several times."""
-    groups: dict[tuple[_Law, int], list[tuple[int, Float64]]] = defaultdict(list)
-    for index, laws in rows:
-        seen: dict[_Law, int] = defaultdict(int)
-        for law, values in laws:
-            groups[law, seen[law]].append((index, values))
-            seen[law] += 1
-    return [
-        (law, np.array([index for index, _ in group]), np.stack([values for _, values in group]))
-        for (law, _), group in groups.items()
-    ]
 
 
 _CONSTANTS = frozenset(

@@ -92,11 +92,6 @@ def percent_text(share: float) -> str:
     return f"{100.0 * share:.1f} %".replace(".0 %", " %")
 
 
-def listing(names: Sequence[str]) -> str:
-    """Return names as in a sentence: ``a, b and c``."""
-    return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else "".join(names)
-
-
 def significant(findings: Sequence[Finding]) -> list[Finding]:
     """Return the findings whose p, adjusted where it is, is below ALPHA."""
     return [finding for finding in findings if finding.is_significant]

@@ -6,9 +6,9 @@ from importlib import metadata
 import msgspec
 
 from shared.runtime.build import commit
-from shared.study.analysis.chapter import listing
 from shared.study.analysis.finding import ALPHA, CONFIDENCE
 from shared.study.tables import Tables
+from shared.telemetry.wording import listing
 
 PACKAGES = ("riposte", "numpy", "scipy", "statsmodels", "pandas")
 

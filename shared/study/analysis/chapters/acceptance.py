@@ -12,7 +12,6 @@ from shared.study.analysis.chapter import (
     Table,
     estimate_words,
     interval_text,
-    listing,
     p_text,
     p_words,
     percent_text,
@@ -27,6 +26,7 @@ from shared.study.analysis.questionnaires import Scale, choice_items, chosen, sc
 from shared.study.analysis.repeated import repeated_anova
 from shared.study.tables import Tables
 from shared.telemetry.study_figures import answer_bars
+from shared.telemetry.wording import listing
 
 Floats = NDArray[np.float64]
 

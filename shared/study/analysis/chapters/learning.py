@@ -12,7 +12,6 @@ from shared.study.analysis.chapter import (
     Table,
     estimate_words,
     interval_text,
-    listing,
     number_text,
     p_text,
     p_words,
@@ -27,6 +26,7 @@ from shared.study.analysis.regression import compare_slopes, mean_slope, person_
 from shared.study.analysis.repeated import repeated_anova
 from shared.study.analysis.switch import switch_effect
 from shared.telemetry.study_figures import LinePanel, learning_panels
+from shared.telemetry.wording import listing
 
 Floats = NDArray[np.float64]
 

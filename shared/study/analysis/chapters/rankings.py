@@ -11,7 +11,6 @@ from shared.study.analysis.chapter import (
     Picture,
     Table,
     interval_text,
-    listing,
     number_text,
     p_words,
     percent_text,
@@ -26,6 +25,7 @@ from shared.study.analysis.questionnaires import ranks_of
 from shared.study.analysis.repeated import repeated_anova
 from shared.study.tables import Tables
 from shared.telemetry.study_figures import RankPanel, rank_panels
+from shared.telemetry.wording import listing
 
 Floats = NDArray[np.float64]
 

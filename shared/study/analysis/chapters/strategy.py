@@ -9,7 +9,6 @@ from shared.study.analysis.chapter import (
     Picture,
     Table,
     interval_text,
-    listing,
     number_text,
     p_words,
     significant,
@@ -22,6 +21,7 @@ from shared.study.analysis.shuffles import shuffled_variance
 from shared.study.analysis.variances import compare_variances
 from shared.styles.features import FEATURES
 from shared.telemetry.study_figures import RatioBar, ScatterPanel, ratio_bars, scatter_panels
+from shared.telemetry.wording import listing
 
 Floats = NDArray[np.float64]
 EXTREME = 5
