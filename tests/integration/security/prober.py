@@ -119,7 +119,9 @@ class Prober:
             key = str(it.key_expr)
             self._note("appear", key.split("/")[5], key)
 
-        self.kept.append(self.witness.liveliness().declare_subscriber(f"{PREFIX}/**", hear))
+        # with history: the router may hear of a role's token before it hears of the subscriber
+        everybody = self.witness.liveliness().declare_subscriber(f"{PREFIX}/**", hear, history=True)
+        self.kept.append(everybody)
         for role, session in self.roles.items():
             self.kept += [
                 session.liveliness().declare_token(f"{RUN}/alive/{key_role(other)}/{role}/boot")

@@ -49,7 +49,7 @@ def check(site: Locked, roles: tuple[Role, ...]) -> None:
         if verb == "publish" and key in ("play/bats", "play/arms", "play/robot", "play/gate"):
             assert role == "robot_io"
         if (verb, key) == ("ask", "play/arm"):
-            assert role in ("page", "operator")
+            assert role in ("page", "study", "operator")
 
 
 def test_an_actor_and_a_policy_may_do_what_the_table_says_and_no_more(site: Locked) -> None:
