@@ -5,16 +5,9 @@ import numpy as np
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
 from shared.identification.places import moving, place_of
-from shared.identification.series import (
-    bent_by_load,
-    hide_from_controller,
-    link_inertia,
-    seen_by_tracker,
-    series,
-)
+from shared.identification.series import link_inertia, seen_by_tracker, series
 from shared.identification.subject import Subject
 from shared.sim.plant.row import Row
-from shared.sim.plant.signals import Signal, sampled
 from shared.sim.plant.structure import Structure, series_name
 
 _PART = "gap"
@@ -62,18 +55,12 @@ class Backlash:
         row.field("jnt_range")[joint] = -half, half
         row.field("jnt_solref")[joint] = 2.0 * row.plant.timestep, 1.0
         row.field("jnt_solimp")[joint, :2] = 0.999, 0.9999
+        row.trust_encoders()
         seen = seen_by_tracker(row, place)
         if seen is None:
             row.rest(name, lambda load: -half * float(np.sign(load)))
-            hide_from_controller(
-                row, place, lambda: bent_by_load(row, place, lambda load: -half * np.sign(load))
-            )
-            return
-        # Where the load is near zero, what is seen says on which flank the link lies.
-        off = Signal(seen.at, np.clip(seen.values, -half, half))
-        begin = float(sampled(off.at, off.values, np.zeros(1))[0, 0])
-        row.rest(name, lambda _: begin)
-        hide_from_controller(row, place, lambda: off)
+        else:  # where the load is near zero, it does not say on which flank the link lies
+            row.rest(name, lambda _: float(np.clip(seen, -half, half)))
 
 
 EFFECT = Backlash()

@@ -6,7 +6,7 @@ from shared.identification.places import place_of
 from shared.identification.subject import Subject
 from shared.sim.plant.encoders import misread
 from shared.sim.plant.row import Row
-from shared.sim.plant.structure import JOINT_MOTORS, Structure
+from shared.sim.plant.structure import Structure
 
 
 class EncoderOffset:
@@ -32,8 +32,8 @@ class EncoderOffset:
         return (Quantity("offset", joint.angle, -0.3, 0.3, probe=0.01),)
 
     def structure(self, subject: Subject, place: str) -> Structure:
-        """Return motors for what a controller of poses does wrong, else nothing."""
-        return (JOINT_MOTORS,) if subject.control == "pose" else ()
+        """Return nothing."""
+        return ()
 
     def enter(self, row: Row, place: str, values: Float64) -> None:
         """Let log and controller see another angle."""

@@ -6,7 +6,7 @@ from shared.identification.places import moving
 from shared.identification.subject import Subject
 from shared.sim.plant.encoders import misread
 from shared.sim.plant.row import Row
-from shared.sim.plant.structure import JOINT_MOTORS, Structure
+from shared.sim.plant.structure import Structure
 
 
 class EncoderScale:
@@ -30,8 +30,8 @@ class EncoderScale:
         return (Quantity("share", "1", -0.2, 0.2, probe=0.02),)
 
     def structure(self, subject: Subject, place: str) -> Structure:
-        """Return motors for what a controller of poses does wrong, else nothing."""
-        return (JOINT_MOTORS,) if subject.control == "pose" else ()
+        """Return nothing."""
+        return ()
 
     def enter(self, row: Row, place: str, values: Float64) -> None:
         """Let log and controller see another angle."""

@@ -5,12 +5,7 @@ import math
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
 from shared.identification.places import moving, place_of
-from shared.identification.series import (
-    bent_by_load,
-    hide_from_controller,
-    link_inertia,
-    series,
-)
+from shared.identification.series import link_inertia, series
 from shared.identification.subject import Subject
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure, series_name
@@ -50,9 +45,7 @@ class JointElasticity:
         inertia = link_inertia(row, row.mj_joint(name))
         row.spring(name, compliance, ringing=2.0 * _DAMPING * math.sqrt(inertia))
         if compliance:
-            hide_from_controller(
-                row, place, lambda: bent_by_load(row, place, lambda load: -compliance * load)
-            )
+            row.trust_encoders()
 
 
 EFFECT = JointElasticity()

@@ -4,7 +4,6 @@ import functools
 
 from shared.sim.plant.row import JointsReport, Row
 from shared.sim.plant.signals import Signal
-from shared.sim.plant.targets import as_if_at
 
 _KEPT = 512
 """Recordings, or parts of them, of which it is kept where the joints were."""
@@ -14,7 +13,7 @@ def misread(row: Row, label: str, scale: float, offset: float) -> None:
     """Let the encoder of a joint say ``scale * q + offset`` where the joint is at q.
 
     A servo at the joint holds what the encoder says to its command. A controller of poses takes
-    its kinematics of the encoders, see :func:`shared.sim.plant.targets.as_if_at`.
+    its kinematics of the encoders.
 
     Args:
         row: the arm.
@@ -38,9 +37,8 @@ def misread(row: Row, label: str, scale: float, offset: float) -> None:
         bias[1:3] *= scale
     if row.plant.control != "pose":
         return
-    believed = row.logged_q
-    true = row.logged_q = _true(believed, joint, scale, offset)
-    row.on_target(lambda target: as_if_at(row, target, believed, true))
+    row.logged_q = _true(row.logged_q, joint, scale, offset)
+    row.misread(joint, scale, offset)
 
 
 @functools.lru_cache(_KEPT)

@@ -11,12 +11,13 @@ import numpy as np
 from shared.sim.arm import Float64
 from shared.sim.model import silence
 from shared.sim.plant.centred import centre
+from shared.sim.plant.controllers import Controllers
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.laws import Active, Rubbing, frictions_of, torques_of
 from shared.sim.plant.plant import TOOL, Plant
 from shared.sim.plant.row import JointsReport, Row, Step, TrackerReport
 from shared.sim.plant.signals import Signal, filtered, sampled, sampled_poses
-from shared.sim.plant.structure import JOINT_MOTORS, MOTOR, Structure, compiled
+from shared.sim.plant.structure import Structure, compiled
 
 _CHUNK = 250
 """Steps that a batch takes between two looks at what it recorded."""
@@ -99,15 +100,8 @@ class Rollouts:
         self._columns = np.concatenate(
             [_controls(self.model, int(self.model.actuator(name).id)) for name in plant.actuators]
         )
-        self._motors = np.array(
-            [
-                int(self.model.actuator_ctrladr[self.model.actuator(f"{name}{MOTOR}").id])
-                for name in plant.joints
-                if JOINT_MOTORS in structure
-            ],
-            np.int64,
-        )
         self._batch = mujoco.batch.Batch(self.model, nsim=capacity, nthread=1)
+        self._controllers: Controllers | None = None
         self._expanded: dict[str, Float64] = {}
         self._stale: set[str] = set()
         self._needs_constants = False
@@ -147,6 +141,10 @@ class Rollouts:
         if self.plant.control == "pose":
             for row in rows:
                 centre(row)
+        if self._controllers is None and any(row.encoders for row in rows):
+            self._controllers = Controllers(self.plant, self.model, self.capacity)
+        if self._controllers is not None:
+            self._controllers.begin(rows)
         self._restore(rows)
         ids = np.arange(len(rows))
         self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
@@ -168,7 +166,7 @@ class Rollouts:
         tool = np.empty((len(rows), steps + 1, 7)) if wants_tool else None
         q[:, 0] = qpos[ids][:, self._qpos]
         laws, frictions = torques_of(rows), frictions_of(rows)
-        has_laws = bool(laws or frictions)
+        has_laws = any(row.has_laws for row in rows)
         at: Float64 = timestep * np.arange(steps, dtype=np.float64)
         for begin in range(0, steps, _CHUNK):
             end = min(begin + _CHUNK, steps)
@@ -178,8 +176,6 @@ class Rollouts:
                 # before (Stormer and Verlet's method); else every arm would be early by that.
                 middle = at[begin:end] - 0.5 * timestep
                 ctrl[row.index][:, self._columns] = row.command.mean(middle, timestep)
-                for torques in row.fed if len(self._motors) else ():
-                    ctrl[row.index][:, self._motors] += torques.held(at[begin:end])
             found = (
                 self._closed(ids, ctrl, laws, frictions, begin)
                 if has_laws
@@ -231,8 +227,6 @@ class Rollouts:
         known = self.plant.command
         if not known.is_direct:
             row.command = filtered(row.command.later(known.delay), known.filter, row.duration)
-        for change in row.target_changes:
-            row.command = change(row.command)
         return row
 
     def _restore(self, rows: Sequence[Row]) -> None:
@@ -279,7 +273,7 @@ class Rollouts:
     ) -> tuple[Float64, Float64]:
         batch = self._batch
         qpos, qvel, control = batch.bind("qpos"), batch.bind("qvel"), batch.bind("ctrl")
-        applied, drive = batch.bind("qfrc_applied"), batch.bind("qfrc_actuator")
+        applied, drives = batch.bind("qfrc_applied"), batch.bind("qfrc_actuator")
         bias, sensors = batch.bind("qfrc_bias"), batch.bind("sensordata")
         count = ctrl.shape[1]
         q = np.empty((len(ids), count, len(self._qpos)))
@@ -287,17 +281,27 @@ class Rollouts:
         rubs = self._expanded["dof_frictionloss"] if frictions else np.empty(0)
         joints = np.ix_(ids, self._dofs)
         constant = rubs[joints] if frictions else rubs
+        beside = self._controllers
+        if beside is not None and not len(beside.rows):
+            beside = None
         if begin == 0:  # what the drives do and hold before the first step
             control[ids] = ctrl[:, 0]
             batch.forward(ids)
-            self._drive_before = np.array(drive)
+            self._drive_before = np.array(drives)
         for index in range(count):
             control[ids] = ctrl[:, index]
             applied[ids] = 0.0
             if frictions:
                 rubs[joints] = constant
+            drive = np.array(drives)
             change = drive - self._drive_before
             self._drive_before[:] = drive
+            if beside is not None:
+                its = beside.rows
+                told = control[np.ix_(its, self._columns)]
+                beyond = beside.beyond_servos(told, qpos[its], qvel[its])
+                applied[np.ix_(its, self._dofs)] = beyond
+                drive[np.ix_(its, self._dofs)] += beyond
             for active in (*laws, *frictions):
                 pick = np.ix_(active.rows, self._dofs)
                 step = Step(
@@ -358,7 +362,7 @@ def _controls(model: mujoco.MjModel, actuator: int) -> np.ndarray:
 
 def _motion_of(row: Row, recorded: Recorded) -> Hashable:
     """Return what is equal for arms that move alike; nobody's equal where that cannot be told."""
-    if row.target_changes or row.rests or row.fed:
+    if row.rests:
         return id(row)
     return (
         id(recorded),
@@ -367,6 +371,8 @@ def _motion_of(row: Row, recorded: Recorded) -> Hashable:
         row.initial_qd.tobytes(),
         tuple(sorted((name, values.tobytes()) for name, values in row.fields.items())),
         tuple((id(law), values.tobytes()) for law, values in (*row.laws, *row.frictions)),
+        None if row.encoders is None else row.encoders.scale.tobytes(),
+        None if row.encoders is None else row.encoders.offset.tobytes(),
         tuple(sorted(row.weights.items())),
     )
 

@@ -11,7 +11,7 @@ import numpy as np
 from shared.sim.arm import Float64
 from shared.sim.plant.plant import Plant
 from shared.sim.plant.signals import Signal
-from shared.sim.plant.structure import MOTOR, STIFF, armature_for
+from shared.sim.plant.structure import STIFF, armature_for
 
 
 @dataclass
@@ -84,6 +84,16 @@ class TrackerReport:
     """float64[K, 7] in the base frame."""
 
 
+@dataclass(frozen=True)
+class Encoders:
+    """What encoders say of joints q: ``scale * q + offset``."""
+
+    scale: Float64
+    """float64[J]; 1 is right."""
+    offset: Float64
+    """float64[J]; 0 is right (rad, m)."""
+
+
 @dataclass
 class Row:
     """One arm that replays one trajectory."""
@@ -113,9 +123,6 @@ class Row:
     """float64[J], where the joints are at time 0 (rad, m); not to be changed in place."""
     initial_qd: Float64
     """float64[J] (rad/s, m/s)."""
-    target_changes: list[Callable[[Signal], Signal]] = dataclasses.field(
-        default_factory=list[Callable[[Signal], Signal]]
-    )
     tracker_time: Callable[[Float64], Float64] | None = None
     """Turns instants of the tracker's clock into true ones, if it is not right."""
     joints_reports: list[Callable[[JointsReport], None]] = dataclasses.field(
@@ -133,7 +140,9 @@ class Row:
     rests: dict[str, Callable[[float], float]] = dataclasses.field(
         default_factory=dict[str, Callable[[float], float]]
     )
-    fed: list[Signal] = dataclasses.field(default_factory=list[Signal])
+    encoders: Encoders | None = None
+    """What a pose controller knows the arm by; None where they are right, and their joints all
+    there are."""
     weights: dict[int, float] = dataclasses.field(default_factory=dict[int, float])
     """Weight (N) by body, of what nothing balances on an arm that is weightless otherwise."""
     fields: dict[str, Float64] = dataclasses.field(default_factory=dict[str, Float64])
@@ -141,7 +150,7 @@ class Row:
     @property
     def has_laws(self) -> bool:
         """Return whether something has to be asked at each step what it does to the arm."""
-        return bool(self.laws or self.frictions)
+        return bool(self.laws or self.frictions or self.encoders)
 
     def field(self, name: str) -> Float64:
         """Return a field of this arm's own model, to be changed in place."""
@@ -206,12 +215,26 @@ class Row:
         """
         self.rests[name] = rests
 
-    def feed(self, torques: Signal) -> None:
-        """Put torques on the logged joints by motors of their own: float64[C, J] (N m, N).
+    def trust_encoders(self) -> None:
+        """Let a pose controller know the arm by its encoders alone: it sees no added joint."""
+        if self.plant.control == "pose" and self.encoders is None:
+            count = len(self.plant.labels)
+            self.encoders = Encoders(np.ones(count), np.zeros(count))
 
-        Of no effect in an arm without :data:`shared.sim.plant.structure.JOINT_MOTORS`.
+    def misread(self, joint: int, scale: float, offset: float) -> None:
+        """Let the encoder of a logged joint, by its index, say another angle to pose controllers.
+
+        Args:
+            joint: index of the logged joint.
+            scale: what it says is ``scale`` times what it said,
+            offset: and so much more (rad, m).
         """
-        self.fed.append(torques)
+        self.trust_encoders()
+        if self.encoders is not None:
+            scales, offsets = self.encoders.scale.copy(), self.encoders.offset.copy()
+            scales[joint] *= scale
+            offsets[joint] = scale * offsets[joint] + offset
+            self.encoders = Encoders(scales, offsets)
 
     def torque(self, law: TorqueLaw, values: Float64) -> None:
         """Let a law act on this arm: float64[P] are its parameters."""
@@ -221,10 +244,6 @@ class Row:
         """Let joints of this arm rub by a law: float64[P] are its parameters."""
         self.field("dof_frictionloss")
         self.frictions.append((law, np.asarray(values, np.float64)))
-
-    def on_target(self, change: Callable[[Signal], Signal]) -> None:
-        """Change the command after the known delay and filter: what the servo compares with."""
-        self.target_changes.append(change)
 
     def on_joints(self, change: Callable[[JointsReport], None]) -> None:
         """Change what the robot logs of its joints."""
@@ -246,7 +265,5 @@ def drives_of(plant: Plant, model: mujoco.MjModel, label: str) -> list[int]:
     return [
         index
         for index, kind in enumerate(model.actuator_trntype)
-        if kind == mujoco.mjtTrn.mjTRN_JOINT
-        and model.actuator_trnid[index, 0] == joint
-        and not model.actuator(index).name.endswith(MOTOR)
+        if kind == mujoco.mjtTrn.mjTRN_JOINT and model.actuator_trnid[index, 0] == joint
     ]

@@ -17,8 +17,6 @@ STIFF = 1e9
 """Of an added spring until an effect sets it, and the most there is (N m/rad)."""
 NO_FORCE = 1e-12
 """A range of nothing is none to MuJoCo (N m, N)."""
-MOTOR = "/motor"
-"""After a joint's name: the motor that :meth:`Builder.joint_motors` adds."""
 _JOINT = (
     "type", "pos", "axis", "ref", "range", "limited", "margin", "stiffness", "springref",
     "springdamper", "damping", "armature", "frictionloss", "actfrcrange", "actfrclimited",
@@ -70,16 +68,6 @@ class Builder:
         )
         self._lock(made)
 
-    def joint_motors(self) -> None:
-        """Give each logged joint a motor, ``NAME/motor``, for :meth:`Row.feed`.
-
-        What the joint's drives may put on it at most holds for the sum.
-        """
-        for name in self.plant.joints:
-            made = self.spec.add_actuator(name=f"{name}{MOTOR}", target=name)
-            made.trntype = mujoco.mjtTrn.mjTRN_JOINT
-            made.set_to_motor()
-
     def base_joint(self, axis: tuple[float, float, float], name: str) -> None:
         """Let what the arm stands on turn about an axis at its origin, before anything else moves.
 
@@ -124,10 +112,6 @@ class Builder:
                 mujoco.mju_rotVecQuat(place, site.pos, body.quat)
                 self.spec.worldbody.add_site(name=fixed, pos=body.pos + place, quat=turned)
             sensor.refname = fixed
-
-
-JOINT_MOTORS = Edit("joint motors", Builder.joint_motors)
-"""For effects that feed torques forward: :meth:`Row.feed`."""
 
 
 def armature_for(stiffness: float, timestep: float) -> float:

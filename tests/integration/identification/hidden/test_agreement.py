@@ -28,6 +28,9 @@ EXACT = [
     ("arm3", "thermal_derating", "shoulder", 2e-3, 0.06),
     ("torque2", "torque_gain", "elbow", 0.2, 0.03),
     ("pr2", "command_frame", "", 0.01, 0.02),
+    ("pr2", "joint_elasticity", "elbow_flex", 3e-3, 0.1),
+    ("pr2", "backlash", "elbow_flex", 0.02, 0.08),
+    ("pr2", "encoder_offset", "elbow_flex", 0.03, 0.12),
 ]
 """Arm, effect, place, size, limit."""
 ALIKE = [

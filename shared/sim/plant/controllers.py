@@ -1,0 +1,109 @@
+"""Controllers of poses that know the arm by its encoders alone, as real ones do.
+
+The simulator's servos act at the tool itself. That is the same as long as encoders, joints and
+model agree; where a link is off its motor or an encoder is wrong, a real controller does not know:
+its pose, velocity and Jacobian of the tool are those of an arm that stands where the encoders say.
+Servos stay, since the simulator takes their damping implicitly; what a controller does differently
+is added to them.
+"""
+
+from collections.abc import Sequence
+
+import mujoco
+import mujoco.batch
+import numpy as np
+
+from shared.sim.arm import Float64
+from shared.sim.plant.plant import Plant
+from shared.sim.plant.row import Row
+from shared.sim.plant.structure import compiled
+
+_GAINS = ("actuator_gainprm", "actuator_biasprm")
+_LIMITS = "jnt_actfrcrange"
+
+
+class Controllers:
+    """One for each of some arms of a batch."""
+
+    def __init__(self, plant: Plant, model: mujoco.MjModel, capacity: int) -> None:
+        """Compile the arm as its controller knows it.
+
+        Args:
+            plant: the arm.
+            model: of the batch, with whatever was added to the arm.
+            capacity: the most arms at once.
+        """
+        known = compiled(plant, ())
+        known.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+        self._known = known
+        # Each arm twice: where its encoders say that it is, and where its links are.
+        self._batch = mujoco.batch.Batch(known, nsim=2 * capacity, nthread=1)
+        self._expanded = {name: self._batch.expand(name) for name in (*_GAINS, _LIMITS)}
+        names = ("qpos", "qvel", "ctrl", "qfrc_actuator")  # bound before they are computed
+        self._q, self._qd, self._command, self._torques = (self._batch.bind(n) for n in names)
+        self._servos = [known.actuator(index).name for index in range(len(known.actuator_trntype))]
+        self._joints = [known.joint(name) for name in plant.joints]
+        self._qpos = np.array([int(joint.qposadr[0]) for joint in self._joints])
+        self._dofs = np.array([int(joint.dofadr[0]) for joint in self._joints])
+        self._turns = [_turns(model, name) for name in plant.joints]
+        self.rows = np.empty(0, np.int64)
+        """int64[K], the arms in their batch."""
+        self._scale = self._offset = np.empty((0, len(plant.joints)))
+
+    def begin(self, rows: Sequence[Row]) -> None:
+        """Take gains and limits of those arms of a batch that trust their encoders.
+
+        Args:
+            rows: all arms, with everything in them.
+        """
+        ours = [row for row in rows if row.encoders is not None]
+        self.rows = np.array([row.index for row in ours], np.int64)
+        encoders = [row.encoders for row in ours if row.encoders is not None]
+        shape = len(ours), len(self._joints)
+        self._scale = np.reshape([each.scale for each in encoders], shape)
+        self._offset = np.reshape([each.offset for each in encoders], shape)
+        for index, row in enumerate(ours):
+            servos = [int(row.model.actuator(name).id) for name in self._servos]
+            joints = [row.mj_joint(joint.name) for joint in self._joints]
+            for position in (index, len(ours) + index):
+                for name in _GAINS:
+                    own = self._expanded[name][position]
+                    own[:] = row.current(name)[servos].reshape(own.shape)
+                limits = self._expanded[_LIMITS][position].reshape(-1, 2)
+                limits[[int(joint.id) for joint in self._joints]] = row.current(_LIMITS)[joints]
+
+    def beyond_servos(self, command: Float64, qpos: Float64, qvel: Float64) -> Float64:
+        """Return float64[K, J], what the controllers do beyond servos that see the tool (N m).
+
+        Args:
+            command: float64[K, U], controls of the servos.
+            qpos: float64[K, Q], of the arms.
+            qvel: float64[K, V].
+        """
+        q, qd, links, links_rate = (np.empty((len(self.rows), len(self._turns))) for _ in range(4))
+        for joint, (places, dofs) in enumerate(self._turns):
+            q[:, joint], qd[:, joint] = qpos[:, places[0]], qvel[:, dofs[0]]
+            links[:, joint] = qpos[:, places].sum(axis=1)
+            links_rate[:, joint] = qvel[:, dofs].sum(axis=1)
+        count = len(self.rows)
+        ids = np.arange(2 * count)
+        said = self._scale * q + self._offset
+        self._q[np.ix_(ids, self._qpos)] = np.concatenate([said, links])
+        self._qd[np.ix_(ids, self._dofs)] = np.concatenate([self._scale * qd, links_rate])
+        self._command[ids] = np.concatenate([command, command])
+        self._batch.forward(ids)
+        torques = self._torques[np.ix_(ids, self._dofs)]
+        return np.asarray(torques[:count] - torques[count:], np.float64)
+
+
+def _turns(model: mujoco.MjModel, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return where position and velocity of a joint are, and of those added behind its motor."""
+    joints = [model.joint(name)]
+    for index in range(model.njnt):
+        joint = model.joint(index)
+        if joint.name.startswith(f"{name}/"):
+            joints.append(joint)
+    return (
+        np.array([int(joint.qposadr[0]) for joint in joints]),
+        np.array([int(joint.dofadr[0]) for joint in joints]),
+    )
