@@ -22,6 +22,10 @@ LEAST_SHARE = 0.05
 """Of the base fit's explainable held-out loss that a cause must take off to be of use."""
 LEAST_GAIN = 0.06
 """Of the held-out loss that is left when it comes, the same."""
+LEAST_OF_EXCESS = 0.2
+"""Of what is left beyond noise that repeats have measured: enough, too, if it is also"""
+LEAST_AT_ALL = 0.02
+"""of the held-out loss: what makes up for a base that is not quite right takes off some of that."""
 FEWEST = 4
 """Stretches that it takes to be sure of anything."""
 _DRAWS = 2000
@@ -47,6 +51,8 @@ class Gain:
     """Low end of the 99 % interval; minus infinity where stretches are too few to be sure."""
     error: float
     """Standard error of the difference."""
+    is_measured: bool = False
+    """Whether repeats say that a mean square of 1 is noise."""
 
     @property
     def gain(self) -> float:
@@ -67,9 +73,16 @@ class Gain:
         return min(self.low / explainable, 1.0), min(self.high / explainable, 1.0)
 
     @property
+    def is_enough(self) -> bool:
+        """Return whether it is better by enough of what was left before."""
+        of_excess = max(LEAST_OF_EXCESS * (self.before - 1.0), LEAST_AT_ALL * self.before)
+        least = LEAST_GAIN * self.before
+        return self.gain >= (min(least, of_excess) if self.is_measured else least)
+
+    @property
     def is_sure(self) -> bool:
-        """Return whether it is surely better, and by enough of what was left before."""
-        return self.surely > 0.0 and self.gain >= LEAST_GAIN * self.before
+        """Return whether it is surely better, and by enough."""
+        return self.surely > 0.0 and self.is_enough
 
     def is_useful(self, base: float) -> bool:
         """Return whether it passes: surely better, and by enough."""
@@ -81,17 +94,21 @@ def stretches(problem: Problem, variant: Variant, segments: tuple[int, ...]) -> 
 
     A part of a recording counts without the blocks that the problem says not to count.
     """
-    size = round(STRETCH / BLOCK)
-    found: list[float] = []
-    for segment, part in zip(segments, problem.residuals([variant], segments)[0], strict=True):
-        power = np.mean(part**2, axis=1)
-        if segment in problem.uncounted:
-            power = power[~problem.uncounted[segment]]
-        if not len(power):
-            continue
-        count = max(len(power) // size, 1)
-        found += [float(np.mean(piece)) for piece in np.array_split(power, count)]
-    return np.array(found)
+    parts = problem.residuals([variant], segments)[0]
+    return np.concatenate(
+        [parted(problem, segment, part) for segment, part in zip(segments, parts, strict=True)]
+    )
+
+
+def parted(problem: Problem, segment: int, residual: Float64) -> Float64:
+    """Return float64[S], mean square of each stretch of one segment's residual, float64[B, C]."""
+    power = np.mean(residual**2, axis=1)
+    if segment in problem.uncounted:
+        power = power[~problem.uncounted[segment]]
+    if not len(power):
+        return np.empty(0)
+    count = max(len(power) // round(STRETCH / BLOCK), 1)
+    return np.array([float(np.mean(piece)) for piece in np.array_split(power, count)])
 
 
 def compare(before: Float64, after: Float64, rng: np.random.Generator) -> Gain:
