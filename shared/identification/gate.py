@@ -23,9 +23,10 @@ LEAST_SHARE = 0.05
 LEAST_GAIN = 0.06
 """Of the held-out loss that is left when it comes, the same."""
 LEAST_OF_EXCESS = 0.2
-"""Of what is left beyond noise that repeats have measured: enough, too, if it is also"""
+"""Where repeats have measured the noise and not much more than that is left: of what is more. Some
+of it is the base's fault, and many a cause takes a little of that off."""
 LEAST_AT_ALL = 0.02
-"""of the held-out loss: what makes up for a base that is not quite right takes off some of that."""
+"""Of the held-out loss, then."""
 FEWEST = 4
 """Stretches that it takes to be sure of anything."""
 _DRAWS = 2000
@@ -75,9 +76,12 @@ class Gain:
     @property
     def is_enough(self) -> bool:
         """Return whether it is better by enough of what was left before."""
-        of_excess = max(LEAST_OF_EXCESS * (self.before - 1.0), LEAST_AT_ALL * self.before)
         least = LEAST_GAIN * self.before
-        return self.gain >= (min(least, of_excess) if self.is_measured else least)
+        if self.is_measured:
+            near_noise = LEAST_OF_EXCESS * (self.before - 1.0)
+            least = min(near_noise, max(least, LEAST_OF_EXCESS))
+            least = max(least, LEAST_AT_ALL * self.before)
+        return self.gain >= least
 
     @property
     def is_sure(self) -> bool:

@@ -184,7 +184,7 @@ class Robot:
         if self.has_controller:
             controller = controller_of(self.plant, model)
             command = command.later(float(model.actuator_delay[0]))
-        ctrl = command.held(times)
+        ctrl = command.mean(times, self.timestep)  # one may come within a step
         holds = [make() for make in self.holds]
         drives, laws = [make() for make in self.drives], [make() for make in self.laws]
         _begin(model, data, qpos, (rest - self.offset) / self.scale, ctrl[0])

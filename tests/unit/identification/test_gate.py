@@ -67,3 +67,24 @@ def test_what_happened_once_is_in_one_stretch_and_in_none_where_it_is_not_counte
 def test_the_floor_is_always_below_the_base():
     assert floor_of(10.0) == 1.15
     assert floor_of(1.0) == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize(
+    ("before", "gain", "is_measured", "is_enough"),
+    [
+        (1.05, 0.03, True, True),
+        (1.05, 0.03, False, False),
+        (1.05, 0.015, True, False),  # hardly anything
+        (1.4, 0.06, True, False),  # the base is not quite right, and many take some of that off
+        (1.4, 0.09, True, True),
+        (3.0, 0.21, True, True),
+        (10.0, 0.5, True, False),
+        (10.0, 0.7, False, True),
+    ],
+)
+def test_how_much_is_enough_depends_on_what_is_left_beyond_measured_noise(
+    before: float, gain: float, is_measured: bool, is_enough: bool
+):
+    loss = before - gain
+    found = Gain(loss, before, 0.5 * gain, 1.5 * gain, 0.1 * gain, 0.2 * gain, is_measured)
+    assert found.is_enough == is_enough

@@ -9,19 +9,24 @@ from shared.sim.hidden.robot import Robot
 
 
 def _enter(robot: Robot, case: Case) -> None:
-    robot.holds.append(lambda: _latch(case))
+    robot.holds.append(lambda: _latch(case, robot.timestep))
 
 
-def _latch(case: Case) -> Callable[[float, Float64], Float64]:
+def _latch(case: Case, timestep: float) -> Callable[[float, Float64], Float64]:
+    """Return what holds a command; a turn within a step counts for what is left of the step."""
     late = float(case.shape[0])
     turn, held = -math.inf, None
 
     def hold(time: float, wanted: Float64) -> Float64:
         nonlocal turn, held
-        now = math.floor(time / case.size - late + 1e-9)
-        if now != turn or held is None:
-            turn, held = now, wanted
-        return held
+        end = time + timestep
+        now = math.floor(end / case.size - late)
+        if now == turn and held is not None:
+            return held
+        before = wanted if held is None else held
+        turn, held = now, wanted
+        share = min((end - case.size * (now + late)) / timestep, 1.0)
+        return before + share * (wanted - before)
 
     return hold
 
