@@ -22,10 +22,10 @@ LEAST_SHARE = 0.05
 """Of the base fit's explainable held-out loss that a cause must take off to be of use."""
 LEAST_GAIN = 0.06
 """Of the held-out loss that is left when it comes, the same."""
-LEAST_OF_EXCESS = 0.2
+LEAST_OF_EXCESS = 0.25
 """Where repeats have measured the noise and not much more than that is left: of what is more. Some
 of it is the base's fault, and many a cause takes a little of that off."""
-LEAST_AT_ALL = 0.02
+LEAST_AT_ALL = 0.04
 """Of the held-out loss, then."""
 FEWEST = 4
 """Stretches that it takes to be sure of anything."""
