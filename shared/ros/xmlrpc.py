@@ -158,7 +158,12 @@ class XmlRpcServer:
             return
         task = asyncio.get_running_loop().create_task(self._serve(reader, writer))
         self._serving[writer] = task
-        task.add_done_callback(lambda _: self._serving.pop(writer, None))
+        task.add_done_callback(lambda _: self._let_go(writer))
+
+    def _let_go(self, writer: asyncio.StreamWriter) -> None:
+        self._serving.pop(writer, None)
+        if not writer.is_closing():  # its task was cancelled before its first step
+            writer.transport.abort()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._busy += 1
