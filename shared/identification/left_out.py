@@ -50,23 +50,20 @@ def left_out(before: Fit, after: Fit, candidate: Candidate, train: tuple[int, ..
     moved = _own_part(after.jacobian, own)
     size = after.z[own]
     whole, gradient = moved.T @ moved, moved.T @ after.residual
-    found: dict[int, Float64] = {}
+    ones: list[Float64] = []
+    others: list[Float64] = []
     for members in groups.values():
-        rows = np.concatenate([np.arange(*members[segment]) for segment in members])
+        rows = np.concatenate([np.arange(*span) for span in members.values()])
         here = moved[rows]
         square = here.T @ here
         asked = gradient - here.T @ after.residual[rows]
         step = -np.linalg.lstsq(whole - square, asked, rcond=_LEAST)[0]
         step *= _no_further(square, size, step)
-        for segment, span in members.items():
-            part = slice(*span)
-            found[segment] = after.residual[part] + moved[part] @ step
-    ones: list[Float64] = []
-    others: list[Float64] = []
-    for segment, (begin, end) in _spans(problem, train).items():
-        shape = problem.shape_of(segment)
-        ones.append(parted(problem, segment, before.residual[begin:end].reshape(shape)))
-        others.append(parted(problem, segment, found[segment].reshape(shape)))
+        for segment, (begin, end) in members.items():
+            shape = problem.shape_of(segment)
+            left = after.residual[begin:end] + moved[begin:end] @ step
+            ones.append(parted(problem, segment, before.residual[begin:end].reshape(shape)))
+            others.append(parted(problem, segment, left.reshape(shape)))
     return LeftOut(np.concatenate(ones), np.concatenate(others))
 
 
@@ -84,23 +81,17 @@ def _no_further(square: Float64, size: Float64, step: NDArray[np.floating]) -> f
     return 1.0 if asked <= most else float(np.sqrt(most / asked))
 
 
-def _spans(problem: Problem, segments: tuple[int, ...]) -> dict[int, tuple[int, int]]:
-    """Return where each segment's numbers are in a residual."""
-    ends = np.cumsum([problem.size_of(segment) for segment in segments]).tolist()
-    return {
-        segment: (end - problem.size_of(segment), end)
-        for segment, end in zip(segments, ends, strict=True)
-    }
-
-
 def _by_recording(
     problem: Problem, segments: tuple[int, ...]
-) -> dict[int, dict[int, tuple[int, int]]]:
-    """Return the same by recording; a repeat is of the recording that it repeats."""
-    trajectories = problem.dataset.trajectories
-    names = [each.repeats or each.name for each in trajectories]
-    out: dict[int, dict[int, tuple[int, int]]] = {}
-    for segment, span in _spans(problem, segments).items():
-        first = names.index(names[problem.segments[segment].trajectory])
-        out.setdefault(first, {})[segment] = span
+) -> dict[str, dict[int, tuple[int, int]]]:
+    """Return where each segment's numbers are in a residual, by recording.
+
+    A repeat is of the recording that it repeats.
+    """
+    out: dict[str, dict[int, tuple[int, int]]] = {}
+    end = 0
+    for segment in segments:
+        begin, end = end, end + problem.size_of(segment)
+        recording = problem.dataset.trajectories[problem.segments[segment].trajectory]
+        out.setdefault(recording.repeats or recording.name, {})[segment] = (begin, end)
     return out

@@ -16,7 +16,7 @@ import numpy as np
 from shared.sim.arm import Float64
 from shared.sim.plant.plant import Plant
 from shared.sim.plant.row import Row
-from shared.sim.plant.structure import compiled
+from shared.sim.plant.structure import compiled, series_joints
 
 _GAINS = ("actuator_gainprm", "actuator_biasprm")
 _LIMITS = "jnt_actfrcrange"
@@ -41,11 +41,23 @@ class Controllers:
         self._expanded = {name: self._batch.expand(name) for name in (*_GAINS, _LIMITS)}
         names = ("qpos", "qvel", "ctrl", "qfrc_actuator")  # bound before they are computed
         self._q, self._qd, self._command, self._torques = (self._batch.bind(n) for n in names)
-        self._servos = [known.actuator(index).name for index in range(len(known.actuator_trntype))]
-        self._joints = [known.joint(name) for name in plant.joints]
-        self._qpos = np.array([int(joint.qposadr[0]) for joint in self._joints])
-        self._dofs = np.array([int(joint.dofadr[0]) for joint in self._joints])
-        self._turns = [_turns(model, name) for name in plant.joints]
+        servos = [known.actuator(index).name for index in range(len(known.actuator_trntype))]
+        self._servos = [int(model.actuator(name).id) for name in servos]
+        joints = [known.joint(name) for name in plant.joints]
+        self._limited = [int(joint.id) for joint in joints]
+        self._qpos = np.array([int(joint.qposadr[0]) for joint in joints])
+        self._dofs = np.array([int(joint.dofadr[0]) for joint in joints])
+        own = [model.joint(name) for name in plant.joints]
+        self._own = [int(joint.id) for joint in own]
+        self._own_qpos = np.array([int(joint.qposadr[0]) for joint in own])
+        self._own_dofs = np.array([int(joint.dofadr[0]) for joint in own])
+        # What is summed up for each link, float64[Q, J] and float64[V, J] of ones and zeros.
+        self._turns = np.zeros((model.nq, len(joints)))
+        self._rates = np.zeros((model.nv, len(joints)))
+        for index, label in enumerate(plant.labels):
+            of_link = series_joints(plant, model, label)
+            self._turns[model.jnt_qposadr[of_link], index] = 1.0
+            self._rates[model.jnt_dofadr[of_link], index] = 1.0
         self.rows = np.empty(0, np.int64)
         """int64[K], the arms in their batch."""
         self._scale = self._offset = np.empty((0, len(plant.joints)))
@@ -59,18 +71,16 @@ class Controllers:
         ours = [row for row in rows if row.encoders is not None]
         self.rows = np.array([row.index for row in ours], np.int64)
         encoders = [row.encoders for row in ours if row.encoders is not None]
-        shape = len(ours), len(self._joints)
+        shape = len(ours), len(self._own)
         self._scale = np.reshape([each.scale for each in encoders], shape)
         self._offset = np.reshape([each.offset for each in encoders], shape)
         for index, row in enumerate(ours):
-            servos = [int(row.model.actuator(name).id) for name in self._servos]
-            joints = [row.mj_joint(joint.name) for joint in self._joints]
             for position in (index, len(ours) + index):
                 for name in _GAINS:
                     own = self._expanded[name][position]
-                    own[:] = row.current(name)[servos].reshape(own.shape)
+                    own[:] = row.current(name)[self._servos].reshape(own.shape)
                 limits = self._expanded[_LIMITS][position].reshape(-1, 2)
-                limits[[int(joint.id) for joint in self._joints]] = row.current(_LIMITS)[joints]
+                limits[self._limited] = row.current(_LIMITS)[self._own]
 
     def beyond_servos(self, command: Float64, qpos: Float64, qvel: Float64) -> Float64:
         """Return float64[K, J], what the controllers do beyond servos that see the tool (N m).
@@ -80,30 +90,13 @@ class Controllers:
             qpos: float64[K, Q], of the arms.
             qvel: float64[K, V].
         """
-        q, qd, links, links_rate = (np.empty((len(self.rows), len(self._turns))) for _ in range(4))
-        for joint, (places, dofs) in enumerate(self._turns):
-            q[:, joint], qd[:, joint] = qpos[:, places[0]], qvel[:, dofs[0]]
-            links[:, joint] = qpos[:, places].sum(axis=1)
-            links_rate[:, joint] = qvel[:, dofs].sum(axis=1)
         count = len(self.rows)
         ids = np.arange(2 * count)
-        said = self._scale * q + self._offset
-        self._q[np.ix_(ids, self._qpos)] = np.concatenate([said, links])
-        self._qd[np.ix_(ids, self._dofs)] = np.concatenate([self._scale * qd, links_rate])
+        said = self._scale * qpos[:, self._own_qpos] + self._offset
+        rate_said = self._scale * qvel[:, self._own_dofs]
+        self._q[np.ix_(ids, self._qpos)] = np.concatenate([said, qpos @ self._turns])
+        self._qd[np.ix_(ids, self._dofs)] = np.concatenate([rate_said, qvel @ self._rates])
         self._command[ids] = np.concatenate([command, command])
         self._batch.forward(ids)
         torques = self._torques[np.ix_(ids, self._dofs)]
         return np.asarray(torques[:count] - torques[count:], np.float64)
-
-
-def _turns(model: mujoco.MjModel, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return where position and velocity of a joint are, and of those added behind its motor."""
-    joints = [model.joint(name)]
-    for index in range(model.njnt):
-        joint = model.joint(index)
-        if joint.name.startswith(f"{name}/"):
-            joints.append(joint)
-    return (
-        np.array([int(joint.qposadr[0]) for joint in joints]),
-        np.array([int(joint.dofadr[0]) for joint in joints]),
-    )

@@ -1,12 +1,7 @@
 """A joint whose encoder is not right: the log and the controller believe what it says."""
 
-import functools
-
 from shared.sim.plant.row import JointsReport, Row
 from shared.sim.plant.signals import Signal
-
-_KEPT = 512
-"""Recordings, or parts of them, of which it is kept where the joints were."""
 
 
 def misread(row: Row, label: str, scale: float, offset: float) -> None:
@@ -37,13 +32,7 @@ def misread(row: Row, label: str, scale: float, offset: float) -> None:
         bias[1:3] *= scale
     if row.plant.control != "pose":
         return
-    row.logged_q = _true(row.logged_q, joint, scale, offset)
-    row.misread(joint, scale, offset)
-
-
-@functools.lru_cache(_KEPT)
-def _true(believed: Signal, joint: int, scale: float, offset: float) -> Signal:
-    """Return where the joints are that an encoder has elsewhere."""
-    values = believed.values.copy()
+    at, values = row.logged_q.at, row.logged_q.values.copy()
     values[:, joint] = (values[:, joint] - offset) / scale
-    return Signal(believed.at, values)
+    row.logged_q = Signal(at, values)
+    row.misread(joint, scale, offset)

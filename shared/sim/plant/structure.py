@@ -127,6 +127,19 @@ def series_name(plant: Plant, label: str, part: str = "series") -> str:
     return f"{plant.mj_joint(label)}/{part}"
 
 
+def series_joints(plant: Plant, model: mujoco.MjModel, label: str) -> list[int]:
+    """Return the joints of a model that turn the link of a logged one: itself, those added to it.
+
+    Args:
+        plant: the arm.
+        model: of it, with whatever was added.
+        label: the logged joint.
+    """
+    first, added = plant.mj_joint(label), series_name(plant, label, "")
+    names = [model.joint(index).name for index in range(model.njnt)]
+    return [index for index, name in enumerate(names) if name == first or name.startswith(added)]
+
+
 def compiled(plant: Plant, structure: Structure) -> mujoco.MjModel:
     """Return the arm with edits in it."""
     builder = Builder(plant)
