@@ -1,6 +1,5 @@
 """The actor: asks for a lease, plays it, hands rollouts and results over, asks again."""
 
-import dataclasses
 from typing import Any
 
 import structlog
@@ -13,13 +12,14 @@ from services.actor.frames import WORLD, FrameSampler
 from services.actor.leasing import LeaseKeeper
 from services.actor.opponents import Opponents
 from services.actor.policies import LearningPolicies, LearningPolicy
+from services.actor.reports import Reports
 from shared.bus.base import Bus
 from shared.bus.delivery import Outbox
 from shared.clock import Clock
 from shared.errors import SnapshotError
 from shared.game.reward import RewardConfig
-from shared.messages.league import BoutResults, Lease, Stage
-from shared.messages.topics import FRAMES, RESULTS, ROLLOUT
+from shared.messages.league import Lease, Stage
+from shared.messages.topics import FRAMES, ROLLOUT
 from shared.messages.training import AGENTS, Agent, Receipt, Rollout
 from shared.policy.players import Player
 from shared.policy.snapshot import Fit
@@ -33,8 +33,6 @@ Arrays = dict[str, NDArray[Any]]
 
 UNPLAYABLE_SECONDS, MOST_UNPLAYABLE_SECONDS = 1.0, 60.0
 """Before the next request for work when a lease could not be played; twice as long each time."""
-RESULTS_WINDOW = 256
-"""Result messages that may wait for the league."""
 
 
 class Actor:
@@ -79,9 +77,7 @@ class Actor:
             )
             for agent in AGENTS
         }
-        self._results: Outbox[BoutResults, Receipt] = Outbox(
-            bus, RESULTS, clock, window=RESULTS_WINDOW, timeout=cfg.ask_timeout
-        )
+        self._reports = Reports(bus, clock, cfg.ask_timeout, env.model.hash)
         self._policies = LearningPolicies(bus, fit)
         self._frames = FrameSampler(env, clock, cfg.frame_period, cfg.frame_steps)
         self._keeper = LeaseKeeper(bus, clock, cfg.num_envs, cfg.rollout_steps, cfg.ask_timeout)
@@ -91,7 +87,6 @@ class Actor:
         self._evaluation: Evaluation | None = None
         self._unplayable_seconds = UNPLAYABLE_SECONDS
         self._rollout_sequence = 0
-        self._result_sequence = 0
         self._resume: tuple[Arrays, dict[str, Any]] | None = None
         self.paused = False
         """Keep up with everybody, but play nothing and take on nothing (serial mode, around a
@@ -117,6 +112,8 @@ class Actor:
 
     def tick(self) -> bool:
         """Do one piece of work: at most one rollout, or as many steps of an evaluation."""
+        if self.paused:
+            self._reports.flush()
         did = self._pump()
         did |= self._policies.tick()
         if not (self.paused and self._keeper.is_free):
@@ -142,16 +139,7 @@ class Actor:
                 self._account(rollout.name, receipt.accepted, receipt.reason)
             for rollout, reason in outbox.take_refused():
                 self._account(rollout.name, accepted=False, reason=reason)
-        for results, receipt in self._results.pump():
-            did = True
-            if receipt.accepted:
-                log.info("results_acknowledged", name=results.name)
-            else:
-                self._last_error = f"results {results.name} dropped: {receipt.reason}"
-                log.warning("results_dropped", name=results.name, reason=receipt.reason)
-        for results, reason in self._results.take_refused():
-            self._last_error = f"results {results.name} refused: {reason}"
-            log.warning("results_refused", name=results.name, reason=reason)
+        did |= self._reports.tick()
         return did
 
     def _account(self, name: str, accepted: bool, reason: str) -> None:
@@ -167,6 +155,7 @@ class Actor:
 
     def _forget(self) -> None:
         """Stop what was being played; what was handed over stays in the outboxes."""
+        self._reports.flush()
         self._playing = ""
         self._collector = None
         self._evaluation = None
@@ -234,8 +223,8 @@ class Actor:
 
     def _play(self, lease: Lease) -> bool:
         """Play one rollout, or a stretch of an evaluation."""
-        if self._results.full:
-            self._wait_for(f"league: {self._results.unacknowledged} results unacknowledged")
+        if self._reports.full:
+            self._wait_for(f"league: {self._reports.outstanding} results unacknowledged")
             return False
         if self._evaluation is not None:
             results = self._evaluation.advance(self._cfg.rollout_steps, self._frames.on_step)
@@ -299,22 +288,8 @@ class Actor:
 
     def _report(self, lease: Lease, results: Results, players: tuple[str, str]) -> None:
         """Hand finished bouts to the league."""
-        message = BoutResults(
-            actor=self._bus.name,
-            boot=self._bus.boot,
-            sequence=self._result_sequence,
-            lease=lease.lease,
-            kind="evaluate" if lease.stage is None else "train",
-            stage=-1 if lease.stage is None else lease.stage.index,
-            antagonist=players[0],
-            protagonist=players[1],
-            model=self._env.model.hash,
-            seed=lease.seed,
-            **dataclasses.asdict(results),
-        )
-        self._result_sequence += 1
         self._counters["bouts"] += len(results.bouts)
-        self._results.put(message)
+        self._reports.add(lease, players, results)
 
     def _show(self, lease: Lease, bout: int, players: tuple[str, str]) -> None:
         frames = self._frames.take(self._bus.name, lease.lease, bout, players)
@@ -337,9 +312,9 @@ class Actor:
     @property
     def quiet(self) -> bool:
         """Return whether nothing is under way between this actor and anybody, nor half done."""
-        outboxes = (*self._rollouts.values(), self._results)
         return not (
-            any(outbox.unacknowledged for outbox in outboxes)
+            any(outbox.unacknowledged for outbox in self._rollouts.values())
+            or self._reports.outstanding
             or not self._keeper.quiet
             or self._evaluation
         )
@@ -356,7 +331,7 @@ class Actor:
         values: dict[str, Any] = {
             "keeper": self._keeper.state(),
             "rollout_sequence": self._rollout_sequence,
-            "result_sequence": self._result_sequence,
+            "result_sequence": self._reports.sequence,
             "collector": None,
         }
         if self._collector is not None:
@@ -367,7 +342,7 @@ class Actor:
         """Continue from what ``state`` returned, once the players of the lease are here again."""
         self._keeper.restore(values["keeper"])
         self._rollout_sequence = int(values["rollout_sequence"])
-        self._result_sequence = int(values["result_sequence"])
+        self._reports.sequence = int(values["result_sequence"])
         if values["collector"] is not None:
             self._resume = (arrays, values["collector"])
 
@@ -389,9 +364,10 @@ class Actor:
             waiting_seconds=waited,
             rates={"steps_per_s": self._samples.per_second()},
             counters={**self._counters, "opponents_cached": len(self._opponents)},
-            last_error=self._last_error or self._policies.last_error,
+            last_error=self._last_error or self._reports.last_error or self._policies.last_error,
             policies=self._policies.versions,
         )
 
     def close(self) -> None:
-        """Nothing to finish: whatever was not acknowledged is played again by somebody."""
+        """Hand over what is finished; what is not acknowledged is played again by somebody."""
+        self._reports.flush()

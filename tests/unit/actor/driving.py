@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 
 from services.actor.config import ActorConfig
+from services.actor.reports import GATHER_SECONDS
 from services.actor.service import Actor
 from shared.bus.memory import MemoryHub
 from shared.clock import ManualClock
@@ -146,6 +147,11 @@ class Hall:
         for inbox in self.inboxes.values():
             while (request := inbox.take()) is not None:
                 self.arrived.append((request.message, request))
+
+    def hear_results(self) -> None:
+        """Let pass what finished bouts may wait for others, and hear them."""
+        self.clock.advance(GATHER_SECONDS)
+        self.tick(2)
 
     def acknowledge(self, accepted: bool = True, reason: str = "") -> list[Rollout]:
         """Answer every rollout that has arrived, and return them."""

@@ -184,7 +184,7 @@ def test_scores_and_rewards_equal_an_independent_recount_of_the_observations(
     hall.offer = msgspec.structs.replace(TRAIN, stage=msgspec.structs.replace(STAGE, agent=agent))
     hall.announce(policy(agent=agent), agent)
     rollouts = hall.rollouts(9)
-    hall.tick(2)
+    hall.hear_results()
     own = policy(agent=agent).reference
     sign = 1.0 if agent == "antagonist" else -1.0
     played, points = recounted(rollouts, model(), RULES)
@@ -447,7 +447,7 @@ def test_an_actor_restored_from_its_state_plays_on_bit_for_bit():
         for field in ("bouts", "first_step", "obs", "last_obs", "actions", "rewards", "log_probs"):
             np.testing.assert_array_equal(getattr(one, field), getattr(other, field), err_msg=field)
     for hall in halls:
-        hall.tick(2)
+        hall.hear_results()
     tail = [[r.score.tolist() for r in hall.results][-len(resumed.results) :] for hall in halls]
     assert tail[0] == tail[1]
     assert resumed.results
@@ -489,6 +489,7 @@ def test_a_bout_is_shown_from_its_first_step_to_its_last_and_then_there_is_a_pau
         count = len(frames.steps)
         assert frames.positions.shape == (count, len(model().body_names), 3)
         assert frames.in_target.shape == (count, 2)
+    hall.hear_results()
     told = next(r for r in hall.results if 0 in r.bouts.tolist())
     assert shown[-1].score[-1] == told.score[told.bouts.tolist().index(0)]
     hall.clock.advance(2.1)
