@@ -7,7 +7,7 @@ import numpy as np
 from shared.identification.causes import causes_of, ties_of
 from shared.identification.certainty import half_widths
 from shared.identification.dataset.types import Float64
-from shared.identification.gate import LEAST_SHARE, compare, floor_of
+from shared.identification.gate import compare, floor_of
 from shared.identification.problem import Variant
 from shared.identification.search import ALIKE, Search, Tried
 from shared.identification.sentence import sentence_of
@@ -186,7 +186,7 @@ def _why_not(
         return f"does as well as what was taken, within {ALIKE:.0%} of the gain or its error"
     if tried.gain.surely <= 0.0:
         return "no better on held-out recordings"
-    if tried.gain.share(base) < LEAST_SHARE or not tried.gain.is_enough:
+    if not tried.gain.is_useful(base):
         return "better, but by too little to be of use"
     return "explained better by what was taken"
 

@@ -23,8 +23,9 @@ LEAST_SHARE = 0.05
 LEAST_GAIN = 0.06
 """Of the held-out loss that is left when it comes, the same."""
 LEAST_OF_EXCESS = 0.25
-"""Where repeats have measured the noise and not much more than that is left: of what is more. Some
-of it is the base's fault, and many a cause takes a little of that off."""
+"""Where repeats have measured the noise: of what is left beyond it. If that is little, some of it is
+the base's fault, and many a cause takes a little of that off; if another cause was far larger, it
+is what makes one of use beside it."""
 LEAST_AT_ALL = 0.04
 """Of the held-out loss, then."""
 FEWEST = 4
@@ -90,7 +91,10 @@ class Gain:
 
     def is_useful(self, base: float) -> bool:
         """Return whether it passes: surely better, and by enough."""
-        return self.is_sure and self.share(base) >= LEAST_SHARE
+        return self.is_sure and (
+            self.share(base) >= LEAST_SHARE
+            or (self.is_measured and self.gain >= LEAST_OF_EXCESS * (self.before - 1.0))
+        )
 
 
 def stretches(problem: Problem, variant: Variant, segments: tuple[int, ...]) -> Float64:

@@ -111,10 +111,13 @@ def search(found: Search, progress: Progress) -> None:
 def _is_over(found: Search) -> bool:
     """Return whether nothing is left that a cause could be named for.
 
-    It is not told from noise, or all of it is less than what a cause must take off to be of use.
+    It is not told from noise or, where that was not measured, all of it is less than what a cause
+    must take off to be of use.
     """
+    if found.problem.noise.is_measured:
+        return _is_quiet(found, found.current_losses)
     left, base = float(found.current_losses.mean()), float(found.base_losses.mean())
-    return left < LEAST_SHARE * (base - floor_of(base)) or _is_quiet(found, found.current_losses)
+    return left < LEAST_SHARE * (base - floor_of(base))
 
 
 def _is_quiet(found: Search, losses: Float64) -> bool:

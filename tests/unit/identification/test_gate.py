@@ -47,6 +47,16 @@ def test_a_cause_is_useful_only_if_it_is_sure_and_enough():
     assert not gain(100.0, 99.0, 0.5).is_useful(10.0)  # 1 % of what is left
 
 
+def test_beside_a_far_larger_cause_a_quarter_of_what_noise_does_not_account_for_is_of_use():
+    def gain(before: float, loss: float, is_measured: bool) -> Gain:
+        return Gain(loss, before, 0.0, 0.0, 0.2, 0.1, is_measured)
+
+    assert gain(2.2, 1.3, True).is_useful(105.0)
+    assert gain(2.2, 1.85, True).is_useful(105.0)
+    assert not gain(2.2, 1.95, True).is_useful(105.0)  # a larger one is never modelled exactly
+    assert not gain(2.2, 1.3, False).is_useful(105.0)  # who knows what of it is noise
+
+
 def test_what_happened_once_is_in_one_stretch_and_in_none_where_it_is_not_counted(tmp_path: Path):
     problem = problem_of(measure(tmp_path, np.random.default_rng(0), seconds=4.0))
     (held_out,) = problem.of("test")
