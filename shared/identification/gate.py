@@ -23,9 +23,9 @@ LEAST_SHARE = 0.05
 LEAST_GAIN = 0.06
 """Of the held-out loss that is left when it comes, the same."""
 LEAST_OF_EXCESS = 0.25
-"""Where repeats have measured the noise: of what is left beyond it. If that is little, some of it is
-the base's fault, and many a cause takes a little of that off; if another cause was far larger, it
-is what makes one of use beside it."""
+"""Where repeats have measured the noise: of what is left beyond it. If that is little, some of it
+is the base's fault, and many a cause takes a little of that off; if another cause was far larger,
+it is what makes one of use beside it."""
 LEAST_AT_ALL = 0.04
 """Of the held-out loss, then."""
 FEWEST = 4
