@@ -15,6 +15,8 @@ FLAGS = (
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1, EXCLUDE localhost",
 )  # fmt: skip
 
+ARMED = ("ramping", "armed", "holding")
+"""Modes of the gate in which the robot may move."""
 POLL_SECONDS = 0.04
 """Between two looks at the page, which cost more than what they look at."""
 
@@ -55,19 +57,20 @@ class Player:
         """Click until the robot is armed: a refusal, such as for a late policy, is asked again."""
 
         def is_armed() -> bool:
-            if self.read("frame().gate.mode") in ("ramping", "armed", "holding"):
+            if self.read("frame()?.gate.mode") in ARMED:
                 return True
             if self.read("action()") == "arm":
-                self.page.click("#primary")
+                self.press()
                 self.page.wait_for_timeout(1000)
             return False
 
         self.until(is_armed)
 
-    def act(self, action: str) -> None:
-        """Click the large button once it offers that."""
-        self.until(lambda: self.read("action()") == action)
-        self.page.click("#primary")
+    def press(self) -> None:
+        """Click where the large button is: one greyed or taken away since a look ignores it."""
+        box = self.page.locator("#primary").bounding_box()
+        if box:
+            self.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
 
 
 @contextmanager

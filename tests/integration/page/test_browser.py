@@ -6,12 +6,13 @@ The tests of this file follow each other in one site, as a visit does. Needs Chr
 import sys
 import time
 from collections.abc import Callable, Iterator
+from itertools import count
 
 import numpy as np
 import pytest
 
 from shared.messages.play import RefereeState
-from tests.integration.page.browsing import Player, browser, find_chromium
+from tests.integration.page.browsing import ARMED, Player, browser, find_chromium
 from tests.integration.page.live import LiveSite
 
 pytestmark = [
@@ -88,7 +89,7 @@ def test_arming_takes_a_click(site: LiveSite, player: Player):
     player.page.keyboard.press("Space")
     player.page.keyboard.press("Enter")
     time.sleep(0.3)
-    assert player.read("frame().gate.mode") == "disarmed"
+    assert player.read("frame()?.gate.mode") not in ARMED
     player.arm()
     assert "robot" in player.page.inner_text("#gate-words")
 
@@ -112,7 +113,7 @@ def test_the_target_scores_and_sounds_and_touching_bats_costs_ten_points(
 
     def is_running() -> bool:  # a machine that stands still for half a second trips the gate
         if player.read("action()") in ("reset", "arm", "start"):
-            player.page.click("#primary", timeout=5_000)
+            player.press()
         counted.add(player.page.inner_text("#big"))
         return bool(site.referee) and site.referee[-1].phase == "running"
 
@@ -147,10 +148,14 @@ def test_the_target_scores_and_sounds_and_touching_bats_costs_ten_points(
 
 
 def test_input_latency_is_measured_and_shown(player: Player, capsys: pytest.CaptureFixture[str]):
-    for k in range(80):
-        player.point(0.3, 0.3 + 0.2 * np.sin(k / 5), 1.3)
-    latency = player.until(lambda: player.read("latency(10)"))
-    assert latency["count"] > 20
+    angles = count()
+
+    def moved() -> dict[str, float] | None:
+        player.point(0.3, 0.3 + 0.2 * np.sin(next(angles) / 5), 1.3)
+        said = player.read("latency(60)")
+        return said if said and said["count"] > 20 else None
+
+    latency = player.until(moved)
     with capsys.disabled():
         sys.stdout.write(f"\npointer to bat state, back in the page (ms): {latency}\n")
     assert 0.0 < latency["p50"] < 1000.0

@@ -29,7 +29,7 @@ def test_a_person_arms_starts_and_fences_a_bout_with_the_mouse(tmp_path: Path):
         def do(action: str) -> None:
             player.point(0.42, 0.4, 1.3)
             if player.read("action()") == action and not player.read("frame().is_lost"):
-                player.page.click("#primary")
+                player.press()
             time.sleep(0.5)
 
         player.until(lambda: do("arm") or player.read("frame().gate.mode") == "armed", 90.0)
