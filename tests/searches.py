@@ -11,7 +11,7 @@ from shared.identification.effect import Candidate
 from shared.identification.fit import Fit, Start, polish
 from shared.identification.gate import compare
 from shared.identification.screen import Screened
-from shared.identification.search import Search, Tried
+from shared.identification.searched import Search, Tried
 from shared.identification.space import Space
 from tests.measured import measure, problem_of
 

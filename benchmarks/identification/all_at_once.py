@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.identification.base_only import share_removed
 from shared.identification.cmaes import minimize
 from shared.identification.gate import stretches
-from shared.identification.search import Search
+from shared.identification.searched import Search
 from shared.identification.space import Space
 
 PENALTY = 0.05

@@ -3,7 +3,7 @@
 from typing import Any
 
 from shared.identification.gate import floor_of
-from shared.identification.search import Search
+from shared.identification.searched import Search
 
 
 def base_only(found: Search) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from shared.identification.gate import FEWEST, stretches
 from shared.identification.pushes import not_counted
-from shared.identification.search import Search
+from shared.identification.searched import Search
 from shared.identification.verdict import Unexplained
 
 

@@ -20,7 +20,7 @@ from shared.identification.noise import noise_of
 from shared.identification.problem import BLOCK, Problem
 from shared.identification.progress import Progress
 from shared.identification.screen import candidates_of
-from shared.identification.search import Search
+from shared.identification.searched import Search
 from shared.identification.space import Space
 from shared.identification.subject import subject_of
 

@@ -1,9 +1,9 @@
 """The causes that a search took, with their sizes, and what is not told from them."""
 
-from shared.identification.certainty import half_widths
+from shared.identification.certainty import CALIBRATED, half_widths
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
-from shared.identification.search import Search, Tried
+from shared.identification.searched import Search, Tried
 from shared.identification.sentence import label
 from shared.identification.verdict import Cause, Interval, Tie
 
@@ -30,7 +30,7 @@ def _cause(found: Search, tried: Tried, values: Float64, widths: Float64, base: 
     candidate = tried.candidate
     quantities = candidate.effect.quantities(found.problem.subject, candidate.place)
     first = quantities[0]
-    half = float(widths[0]) * first.probe
+    half = CALIBRATED * float(widths[0]) * first.probe
     value = float(values[0])
     low, high = tried.gain.share_interval(base)
     return Cause(
@@ -87,6 +87,8 @@ def _motion(tried: Tried, rivals: tuple[Tried, ...], names: list[str]) -> str:
         how = "log joint positions beside the tracker, or fix the tracker elsewhere and repeat"
     elif len(places) > 1 and len({each.candidate.effect.name for each in (tried, *rivals)}) == 1:
         how = "move these joints one at a time, the others held"
+    elif sides == {"command"}:
+        how = "a chirp and fast swings, with readings that come faster than commands"
     else:
         how = (
             "the static grid, the crawl with reversals and fast swings of `riposte identify excite`"

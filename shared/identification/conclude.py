@@ -9,7 +9,7 @@ from shared.identification.certainty import half_widths
 from shared.identification.dataset.types import Float64
 from shared.identification.gate import compare, floor_of
 from shared.identification.problem import Variant
-from shared.identification.search import ALIKE, Search, Tried
+from shared.identification.searched import ALIKE, Search, Tried
 from shared.identification.sentence import sentence_of
 from shared.identification.verdict import (
     BaseValue,

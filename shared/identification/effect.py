@@ -24,6 +24,9 @@ class Quantity:
     """A size that a good recording shows and that is not extreme: where the search starts."""
     is_smooth: bool = True
     """Whether small changes of it change the motion a little; else it is searched on a grid."""
+    phase: str = ""
+    """Of an interval that comes again and again: the number that says, in intervals, how late its
+    first turn is. Such an interval is searched by turns, see ``turns.py``."""
     grid: tuple[float, ...] = ()
     """Where to look first. Of a number that says how, not how much, and means nothing while the
     others are 0: its probe is only what it is counted in. Or of an only number, not smooth, that

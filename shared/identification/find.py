@@ -19,7 +19,8 @@ from shared.identification.leftover import leftovers
 from shared.identification.problem import BLOCK, Variant
 from shared.identification.progress import Progress, silent
 from shared.identification.saved import load, save
-from shared.identification.search import Search, search
+from shared.identification.search import search
+from shared.identification.searched import Search
 from shared.identification.verdict import Unexplained, Verdict
 from shared.runtime.build import commit
 from shared.runtime.service import version

@@ -16,6 +16,7 @@ from shared.identification.fit import Fit, Start, damped, go_down
 from shared.identification.problem import Problem
 from shared.identification.screen import Screened
 from shared.identification.space import Space
+from shared.identification.turns import LIKELY, NEAR, aligned, turning_of
 
 _DAMPINGS = (0.01, 0.3, 10.0)
 """Factors of Marquardt's damping that are tried at once."""
@@ -39,7 +40,9 @@ class Rough:
     """Its cost over the base's, on the recordings that were looked at."""
 
 
-def refit(fit: Fit, nominal: Start, screened: Screened, segments: tuple[int, ...]) -> Rough:
+def refit(
+    fit: Fit, nominal: Start, screened: Screened, segments: tuple[int, ...], begun: Fit
+) -> Rough:
     """Return the better of two refits.
 
     Args:
@@ -47,6 +50,7 @@ def refit(fit: Fit, nominal: Start, screened: Screened, segments: tuple[int, ...
         nominal: the derivative at the nominal model, of the base alone.
         screened: the candidate and where the screen expects it.
         segments: recordings to fit to.
+        begun: where the screen looked from, in the same space as ``fit``.
     """
     space = fit.space.grown(screened.candidate)
     problem = fit.space.problem
@@ -56,7 +60,7 @@ def refit(fit: Fit, nominal: Start, screened: Screened, segments: tuple[int, ...
     rows = _rows(problem, segments, picked)
     extra = space.size - fit.space.size
     way: Float64 = np.concatenate([screened.shift, screened.start])
-    origin: Float64 = np.concatenate([fit.z, np.zeros(extra)])
+    origin: Float64 = np.concatenate([begun.z, np.zeros(extra)])
     forms = [False] * fit.space.size + [bool(each.grid) for each in quantities]
     is_form: NDArray[np.bool_] = np.array(forms)
     ways: list[Float64] = []
@@ -64,15 +68,38 @@ def refit(fit: Fit, nominal: Start, screened: Screened, segments: tuple[int, ...
         there = origin + part * way
         there[is_form] = way[is_form]
         ways.append(space.clip(there))
-    ways.append(space.clip(np.r_[fit.z, screened.start]))
-    first = _descend(space, ways, fit.jacobian[: len(rows)][rows], picked, fit.space.size)
+    ways.append(space.clip(np.r_[begun.z, screened.start]))
+    first = _descend(space, ways, begun.jacobian[: len(rows)][rows], picked, fit.space.size)
     base = np.r_[nominal.z, fit.z[nominal.z.size :]]
     half = np.where(is_form[-extra:], screened.start, 0.5 * screened.start)
     sizes = [space.clip(np.r_[base, size]) for size in (screened.start, half)]
-    second = _descend(space, sizes, nominal.jacobian[: len(rows)][rows], picked, nominal.z.size)
+    kept = nominal.jacobian[: len(rows)][rows]
+    sizes[0] = aligned(space, sizes[0], picked, base=kept)
+    second = _descend(space, sizes, kept, picked, nominal.z.size)
     z, cost = _mended(space, *min((first, second), key=lambda found: found[1]), picked)
     before = 0.5 * float(np.sum(fit.residual[: len(rows)][rows] ** 2))
     return Rough(screened, space, z, cost / max(before, 1e-12))
+
+
+def refit_late(late: Rough, screened: Screened, fit: Fit, segments: tuple[int, ...]) -> Rough:
+    """Return a refit of an interval that may be what looks like a delay of half of it.
+
+    Args:
+        late: the delay's refit.
+        screened: the interval.
+        fit: the base's, with the causes that were accepted before.
+        segments: recordings to fit to.
+    """
+    space = fit.space.grown(screened.candidate)
+    turning = turning_of(space)
+    if turning is None:
+        raise ValueError(f"{screened.candidate.label} has no interval")
+    interval = 2.0 * float(late.space.values(late.z)[-1][0])
+    z = turning.at(np.r_[late.z[: fit.space.size], screened.start], interval, 0.0)
+    z = aligned(space, z, segments, LIKELY, fit.jacobian[:, : fit.space.size])
+    cost = 0.5 * float(np.sum(space.residual([z], segments) ** 2))
+    z, cost = _mended(space, z, cost, segments)
+    return Rough(screened, space, z, cost / max(fit.cost, 1e-12))
 
 
 def _mended(
@@ -119,8 +146,18 @@ def settle(space: Space, start: Float64, segments: tuple[int, ...]) -> Fit:
 
     Twice, where the second derivative still finds something.
     """
-    before = Fit.at(space, space.clip(start), segments)
+    before = _in_turn(Fit.at(space, space.clip(start), segments), segments)
     found = go_down(before, segments, _DAMPINGS)
     if found.cost > before.cost * (1 - _ENOUGH):
         return found
     return go_down(Fit.at(space, found.z, segments), segments, _DAMPINGS)
+
+
+def _in_turn(fit: Fit, segments: tuple[int, ...]) -> Fit:
+    """Return a fit with the newest candidate's interval, if it has one, where it fits best."""
+    turning = turning_of(fit.space)
+    if turning is None:
+        return fit
+    others = fit.jacobian[:, : min(turning.interval, turning.phase)]
+    z = aligned(fit.space, fit.z, segments, NEAR, others)
+    return fit if z is fit.z else Fit.at(fit.space, z, segments)

@@ -6,7 +6,7 @@ import msgspec
 
 from shared.identification.dataset.types import Dataset
 from shared.identification.fit import SavedFits
-from shared.identification.search import Search
+from shared.identification.searched import Search
 from shared.runtime.files import atomic_write
 
 FILE = "base_fit.json"

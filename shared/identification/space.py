@@ -12,6 +12,8 @@ _STEP = 0.02
 """Of a difference quotient along a base coordinate: 2 %."""
 _EXTRA_STEP = 0.1
 """Along the size of an effect, in probes."""
+_OF_TURN = 0.05
+"""Along an interval that comes again and again: of itself, what its last turn moves by."""
 
 
 @dataclass(frozen=True)
@@ -110,9 +112,8 @@ class Space:
             segments: of which recordings.
             only: columns that are wanted; all if None.
         """
-        high = self.bounds[1]
         columns = range(self.size) if only is None else only
-        steps = np.where(z + self.steps > high, -self.steps, self.steps)
+        steps = self._steps_at(z)
         moved = [z]
         for column in columns:
             other = z.copy()
@@ -121,3 +122,26 @@ class Space:
         found = self.residual(moved, segments)
         picked = steps[list(columns)]
         return found[0], (found[1:] - found[0]).T / picked
+
+    def _steps_at(self, z: Float64) -> Float64:
+        """Return float64[n], of difference quotients at a vector, within bounds.
+
+        What a turn far on in a recording does, a step of the usual size would leave far behind.
+        """
+        steps = self.steps
+        for candidate in self.candidates:
+            quantities = candidate.effect.quantities(self.problem.subject, candidate.place)
+            names = [each.name for each in quantities]
+            first = self.where(candidate).start
+            for index, each in enumerate(quantities, first):
+                if each.phase and z[index] > 0.0:
+                    interval, phase = z[index] * each.probe, names.index(each.phase)
+                    steps[index] = _OF_TURN * interval**2 / self._longest / each.probe
+                    steps[first + phase] = _OF_TURN / quantities[phase].probe
+        return np.where(z + steps > self.bounds[1], -steps, steps)
+
+    @property
+    def _longest(self) -> float:
+        """Return how long the longest recording is (s)."""
+        parts = (segment.recorded for segment in self.problem.segments)
+        return max(part.begin + float(part.joints_at[-1]) for part in parts)

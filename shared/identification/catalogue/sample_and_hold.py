@@ -33,7 +33,7 @@ class SampleAndHold:
         Which commands are taken jumps with both.
         """
         return (
-            Quantity("period", "s", 0.0, 0.2, probe=0.02, is_smooth=False),
+            Quantity("period", "s", 0.0, 0.2, probe=0.02, is_smooth=False, phase="phase"),
             Quantity("phase", "1", 0.0, 1.0, probe=0.25, grid=(0.0, 0.25, 0.5, 0.75)),
         )
 

@@ -7,17 +7,21 @@ made the drive.
 """
 
 import functools
+import math
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.motion import smooth_motion
+from shared.identification.motion import Motion, smooth_motion
 from shared.identification.passive import at_joint
 from shared.identification.places import moving, place_of
 from shared.identification.subject import Subject
 from shared.sim.plant.inverse import inverse_dynamics
 from shared.sim.plant.row import Row, Step
+from shared.sim.plant.signals import Signal
 from shared.sim.plant.structure import Structure
 
 MEMORY = 120.0
@@ -26,8 +30,19 @@ _SHORTEST = 2.0
 """Recordings with less in one piece show no history (s)."""
 _FEWEST = 20
 """Readings that a motion can be told from."""
-_SPARSE = 5
-"""Of the instants of a motion, every so many are looked at."""
+_MOST = 10.0
+"""Times what it gives, that a drive is asked for at most."""
+_SLOW = 0.02
+"""Speed from which a joint rubs by all of its friction (rad/s)."""
+
+
+@dataclass(frozen=True)
+class _Done:
+    """What an arm did before time 0."""
+
+    motion: Motion
+    taken: Float64
+    """float64[T, J], what that takes of the nominal arm (N m, N)."""
 
 
 class _Law:
@@ -41,6 +56,9 @@ class _Law:
         memory += step.timestep * (np.square(step.drive) - memory / MEMORY)
         heat = memory + before * np.exp(-step.time / MEMORY)
         return step.drive * (1.0 / (1.0 + loss * heat) - 1.0)
+
+
+_known: WeakKeyDictionary[Signal, _Done | None] = WeakKeyDictionary()
 
 
 @functools.cache
@@ -77,13 +95,17 @@ class ThermalDerating:
         if not values[0]:
             return
         law = _law(len(row.plant.labels))
-        row.torque(law, at_joint(row, place, float(values[0]), _heat_before(row, place)))
+        loss = float(values[0])
+        row.torque(law, at_joint(row, place, loss, _heat_before(row, place, loss)))
 
 
-def _heat_before(row: Row, place: str) -> float:
-    """Return the heat of torques before the arm's time 0: as commanded, or as the motion took."""
+def _heat_before(row: Row, place: str, loss: float) -> float:
+    """Return the heat of what was asked of the drive before the arm's time 0.
+
+    That is what was commanded or, of a servo, what the motion took and was lost on the way.
+    """
     if row.plant.control != "torque":
-        return _heat_of_motion(row, row.plant.labels.index(place))
+        return _heat_of_motion(row, row.plant.labels.index(place), loss)
     before = row.command.at < 0.0
     if not before.any():
         return 0.0
@@ -97,15 +119,45 @@ def _heat_before(row: Row, place: str) -> float:
     return _heat(at, spans, row.command.values[before] @ np.asarray(gears))
 
 
-def _heat_of_motion(row: Row, joint: int) -> float:
-    """Return the heat of the torques that the nominal arm's logged motion took before time 0."""
-    before = row.logged_q.at < 0.0
-    if before.sum() < _FEWEST:
+def _heat_of_motion(row: Row, joint: int, loss: float) -> float:
+    """Return the heat of what a drive was asked for to give what the motion took before time 0."""
+    done = _done(row)
+    if done is None:
         return 0.0
-    motion = smooth_motion(row.logged_q.at[before], row.logged_q.values[before]).sparse(_SPARSE)
-    torque = inverse_dynamics(row.plant, row.model, motion.q, motion.qd, motion.qdd)
-    spans = np.gradient(motion.at) if len(motion.at) > 1 else np.zeros(1)
-    return _heat(motion.at, spans, torque[:, joint])
+    motion = done.motion
+    given = done.taken[:, joint] + _beside_nominal(row, joint, motion)
+    edges = np.r_[row.logged_q.at[0], 0.5 * (motion.at[1:] + motion.at[:-1]), 0.0]
+    heat = 0.0
+    for torque, span in zip(given.tolist(), np.diff(edges).tolist(), strict=True):
+        asked = torque * min(1.0 + loss * heat, _MOST)
+        heat = heat * math.exp(-span / MEMORY) + asked**2 * span
+    return heat
+
+
+def _done(row: Row) -> _Done | None:
+    """Return what the arm did before time 0, None if that is too short to tell; worked out once."""
+    if row.logged_q not in _known:
+        before = row.logged_q.at < 0.0
+        done = None
+        if before.sum() >= _FEWEST:
+            at, q = row.logged_q.at[before], row.logged_q.values[before]
+            motion = smooth_motion(at, q)
+            taken = inverse_dynamics(row.plant, row.model, motion.q, motion.qd, motion.qdd)
+            done = _Done(motion, taken)
+        _known[row.logged_q] = done
+    return _known[row.logged_q]
+
+
+def _beside_nominal(row: Row, joint: int, motion: Motion) -> Float64:
+    """Return float64[T]: what the motion takes of the arm's own joint, not of the nominal one."""
+    dof = row.dofs[joint]
+    more = [
+        float((row.fields[name] if name in row.fields else getattr(row.model, name))[dof])
+        - float(getattr(row.model, name)[dof])
+        for name in ("dof_armature", "dof_damping", "dof_frictionloss")
+    ]
+    speed = motion.qd[:, joint]
+    return more[0] * motion.qdd[:, joint] + more[1] * speed + more[2] * np.tanh(speed / _SLOW)
 
 
 def _heat(at: Float64, spans: Float64, torque: Float64) -> float:

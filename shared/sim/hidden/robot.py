@@ -48,6 +48,7 @@ class Moment:
 
 
 Law = Callable[[Moment], None]
+Hold = Callable[[float, Signal], Float64]
 
 
 @dataclass(frozen=True)
@@ -77,8 +78,8 @@ class Robot:
         self.spec.option.timestep = timestep
         self.commands: list[Callable[[Signal], Signal]] = []
         """Change the stream of commands on its way."""
-        self.holds: list[Callable[[], Callable[[float, Float64], Float64]]] = []
-        """Make what turns the command at an instant (s) into what the controller takes it for."""
+        self.hold: Callable[[], Hold] | None = None
+        """Make what the controller takes of a command in a step that begins at an instant (s)."""
         self.drives: list[Callable[[], Law]] = []
         """Make what changes the drive's torques; called anew for each recording, as ``laws``."""
         self.laws: list[Callable[[], Law]] = []
@@ -106,12 +107,20 @@ class Robot:
         """Let the pose controller know the arm by its encoders alone, as a real one does."""
         self.has_controller = self.has_controller or self.plant.control == "pose"
 
+    def drive_apart(self) -> None:
+        """Let drives get their torques from a controller beside the arm.
+
+        MuJoCo's implicit step counts on the damping of its own servos, also where a drive that is
+        limited or weak does not give it: an arm that is as sluggish as if it did.
+        """
+        self.has_controller = self.plant.control != "torque"
+
     def misread(self, label: str, scale: float, offset: float) -> None:
         """Let an encoder say ``scale * q + offset`` (rad), to the controller as to the log."""
         index = self.plant.labels.index(label)
         self.scale[index] *= scale
         self.offset[index] = scale * self.offset[index] + offset
-        self.has_controller = self.plant.control != "torque"
+        self.drive_apart()
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -184,8 +193,14 @@ class Robot:
         if self.has_controller:
             controller = controller_of(self.plant, model)
             command = command.later(float(model.actuator_delay[0]))
-        ctrl = command.mean(times, self.timestep)  # one may come within a step
-        holds = [make() for make in self.holds]
+        # A step's drive acts from half a step before it to half a step after it (Stormer and
+        # Verlet's method, which MuJoCo's is); else the arm would be early by half of one.
+        begins = times - 0.5 * self.timestep
+        if self.hold is None:
+            ctrl = command.mean(begins, self.timestep)
+        else:
+            hold = self.hold()
+            ctrl = np.stack([hold(begin, command) for begin in begins.tolist()])
         drives, laws = [make() for make in self.drives], [make() for make in self.laws]
         _begin(model, data, qpos, (rest - self.offset) / self.scale, ctrl[0])
         moment = Moment(
@@ -196,10 +211,10 @@ class Robot:
         model.dof_damping[:] += _BRAKE * model.dof_M0
         parts: list[tuple[Float64, Float64]] = []
         for part in (slice(0, settling), slice(settling, len(times))):
-            if controller is None and not (holds or drives or laws):
+            if controller is None and not (drives or laws):
                 parts.append(_rolled(model, data, qpos, dofs, ctrl[part], pushes[part]))
             else:
-                act = _Act(self, moment, controller, holds, drives, laws)
+                act = _Act(self, moment, controller, drives, laws)
                 parts.append(_stepped(act, qpos, times[part], ctrl[part], pushes[part]))
             model.dof_damping[:] = moment.usual_damping
             data.qvel[:] = 0.0
@@ -216,7 +231,6 @@ class _Act:
     robot: Robot
     moment: Moment
     controller: Controller | None
-    holds: list[Callable[[float, Float64], Float64]]
     drives: list[Law]
     laws: list[Law]
 
@@ -249,8 +263,6 @@ def _stepped(
     q, seen = np.empty((len(times), len(qpos))), np.empty((len(times), 7))
     for step, time in enumerate(times.tolist()):
         wanted = ctrl[step]
-        for hold in act.holds:
-            wanted = hold(time, wanted)
         data.ctrl[: len(wanted)] = wanted
         data.qfrc_applied[:] = 0.0
         data.xfrc_applied[:] = 0.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shared.identification.again import fresh, leave_out
-from shared.identification.search import Search
+from shared.identification.searched import Search
 from shared.identification.verdict import Unexplained
 from tests.searches import ELBOW, Searches
 

@@ -26,7 +26,7 @@ def test_a_rough_refit_finds_the_size_with_the_base_beside_it(tmp_path: Path):
     nominal = Start(origin, space.jacobian(origin, train)[1])
     fit = polish(space, origin, train, 3)
     screened = screen(fit, [Candidate(BIAS, "elbow")], train)[0]
-    rough = refit(fit, nominal, screened, train)
+    rough = refit(fit, nominal, screened, train, fit)
     assert rough.space.size == space.size + 1
     assert rough.space.values(rough.z)[0][0] == pytest.approx(0.5, rel=0.1)
     full = polish(rough.space, rough.z, train)

@@ -12,7 +12,8 @@ from shared.identification.catalogue.viscous_friction import EFFECT as VISCOUS
 from shared.identification.dataset.types import Dataset
 from shared.identification.progress import silent
 from shared.identification.saved import FILE, SCHEMA, load, save
-from shared.identification.search import Search, search
+from shared.identification.search import search
+from shared.identification.searched import Search
 from shared.sim.plant.row import Row
 from tests.measured import measure
 from tests.searches import Searches

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,12 @@ import msgspec
 import numpy as np
 import pytest
 
+from shared.identification.catalogue.command_latency import EFFECT as LATE
+from shared.identification.catalogue.sample_and_hold import EFFECT as TURNS
 from shared.identification.catalogue.torque_bias import EFFECT as BIAS
 from shared.identification.catalogue.torque_gain import EFFECT as GAIN
 from shared.identification.dataset.types import Dataset
+from shared.identification.effect import Candidate
 from shared.identification.find import identify
 from shared.identification.hidden.generator import hide
 from shared.identification.hidden.recipe import Recipe, wish_of
@@ -52,6 +56,26 @@ def test_a_cause_that_does_surely_worse_is_no_rival_however_simple(searches: Sea
     taken, rivals = _simplest([worse, best], np.random.default_rng(0))
     assert taken is best
     assert rivals == ()
+
+
+def test_turns_so_short_that_they_are_a_delay_are_a_rival_of_it(searches: Searches):
+    late = searches.tried(Candidate(LATE, ""), _BAD, _GOOD)
+    about = 0.01 + np.tile([-0.06, 0.06], 4)  # better in one stretch, worse in the next
+    turns = searches.tried(Candidate(TURNS, ""), _BAD, _GOOD + about, numbers=2)
+    other = searches.tried(DRAG, _BAD, _GOOD + 0.01, numbers=2)
+    taken, rivals = _simplest([turns, late, other], np.random.default_rng(0))
+    assert taken is late
+    assert rivals == (turns,)
+
+
+@pytest.mark.parametrize(("more", "cost"), [(0.02, 1.0), (0.0, 1.2)])
+def test_turns_that_do_surely_worse_than_a_delay_are_no_rival(
+    searches: Searches, more: float, cost: float
+):
+    late = searches.tried(Candidate(LATE, ""), _BAD, _GOOD)
+    turns = searches.tried(Candidate(TURNS, ""), _BAD, _GOOD + more, numbers=2)
+    worse = replace(turns, fit=replace(turns.fit, cost=cost * late.fit.cost + cost - 1.0))
+    assert _simplest([worse, late], np.random.default_rng(0)) == (late, ())
 
 
 def test_a_search_without_a_candidate_is_over(searches: Searches):

@@ -16,6 +16,7 @@ def _sizes(scene: Scene, place: str) -> tuple[float, float]:
 
 
 def _enter(robot: Robot, case: Case) -> None:
+    robot.drive_apart()
     robot.drives.append(lambda: _warm(case))
 
 

@@ -14,6 +14,7 @@ def _share(case: Case) -> float:
 
 
 def _enter(robot: Robot, case: Case) -> None:
+    robot.drive_apart()
     robot.drives.append(lambda: _scale(case))
 
 

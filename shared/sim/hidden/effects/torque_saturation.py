@@ -10,6 +10,7 @@ def _sizes(scene: Scene, place: str) -> tuple[float, float]:
 
 
 def _enter(robot: Robot, case: Case) -> None:
+    robot.drive_apart()
     robot.drives.append(lambda: _clip(case))
 
 

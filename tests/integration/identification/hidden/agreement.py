@@ -33,14 +33,20 @@ class Agreement:
         return self.apart / self.effect
 
 
-def agreement(arm, name, place, size, seed=4):
-    """Hide an effect without any noise in a robot of the model file; replay it both ways."""
+def agreement(arm, name, place, size, seed=4, *, nothing=None):
+    """Hide an effect without any noise in a robot of the model file; replay it both ways.
+
+    What the effect changes is told from a robot without it or, where ``nothing`` is given, from
+    one in which it has that size, next to nothing: a hidden drive has its controller beside the
+    arm, which alone is more of a change than a drive that is slightly warm.
+    """
     recipe = Recipe(
         arm=arm, seed=seed, spread=0.0, noise=SILENT, has_shares=False, seconds=3.0, train=2,
         test=1, wishes=(Wish(name, place, size),),
     )  # fmt: skip
     dataset, truth = simulated(recipe)
-    plain, _ = simulated(replace(recipe, wishes=()))
+    wishes = () if nothing is None else (Wish(name, place, nothing),)
+    plain, _ = simulated(replace(recipe, wishes=wishes))
     found = truth.effect[0]
     subject = subject_of(dataset)
     effect = next(each for each in effects() if each.name == name)

@@ -130,6 +130,35 @@ def test_a_drive_is_as_warm_as_the_torques_before_made_it(tmp_path: Path) -> Non
     )
 
 
+def test_a_servo_is_as_warm_as_what_was_asked_of_it_to_move_as_it_did(tmp_path: Path) -> None:
+    subject = _cart(tmp_path, joint='stiffness="5" damping="0.5"', kp=20.0)
+    at = np.arange(0.0, 8.0, 0.01)
+    wanted = Signal(at, 0.6 + 0.3 * np.sin(2.0 * at)[:, None])
+    loss = 0.006
+
+    def enter(row: Row) -> None:
+        row.field("dof_armature")[0] += 0.5  # as a base that was fitted
+        row.field("dof_damping")[0] += 2.0
+        THERMAL.enter(row, "cart", np.array([loss]))
+
+    whole = replace(recorded([0.6], 8.0, [0.0]), command=wanted)
+    first = subject.nominal.run([(enter, whole)])[0].q
+    begin = 600
+    part = replace(
+        recorded([0.6], 1.5, first[begin].tolist()),
+        command=Signal(at - 6.0, wanted.values),
+        logged_q=Signal(whole.joints_at - 6.0, first),
+        initial_qd=(first[begin + 1] - first[begin - 1]) / 0.02,
+    )
+    second = subject.nominal.run([(enter, part)])[0].q
+    loss = 0.0
+    cold = subject.nominal.run([(enter, part)])[0].q
+    expected = first[begin : begin + len(second)]
+    apart = np.abs(cold - expected).max()
+    assert apart > 0.02
+    np.testing.assert_allclose(second, expected, atol=0.05 * apart)
+
+
 def test_derating_needs_a_history(tmp_path: Path) -> None:
     subject = _cart(tmp_path)
     assert THERMAL.places(subject) == ("cart",)

@@ -1,0 +1,96 @@
+"""Looks at candidates and refits the best roughly: from the base's fit, and from the nominal model.
+
+A base that lacks a large cause is bent so far towards it that nearby the cause does not show: a
+forearm whose torque is limited to a quarter was fitted with ten times its inertia, and what was
+then missing looked like a friction. Seen from the nominal model it comes first.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shared.identification.effect import Candidate
+from shared.identification.fit import Fit, Start
+from shared.identification.progress import Progress
+from shared.identification.refit import Rough, refit, refit_late
+from shared.identification.screen import Screened, screen
+from shared.identification.turns import LATE
+
+_TRIED = 6
+"""Candidates that are refitted with the base's derivative kept."""
+_MORE = 2
+"""Further ones that only the nominal model shows."""
+_PER_EFFECT = 3
+"""Places of one effect among those tried."""
+_SLIGHT = 0.015
+"""Of the training residual: what explains less at first sight is not refitted."""
+_SLIGHT_BESIDE = 0.1
+"""The same, as a share of what the best one explains."""
+
+
+def look(
+    fit: Fit, nominal: Start, candidates: Sequence[Candidate], is_far: bool, progress: Progress
+) -> tuple[list[Screened], list[Rough]]:
+    """Return what every candidate could explain, best first, and rough refits of the best.
+
+    Args:
+        fit: the base's, with the causes that were accepted before.
+        nominal: the derivative at the nominal model, of the base alone.
+        candidates: what is looked for.
+        is_far: whether so much is left that the base may be bent.
+        progress: is told how far it is.
+    """
+    segments = fit.space.problem.of("train")
+    progress("screen", 0.0, f"{len(candidates)} candidates")
+    screened = screen(fit, candidates, segments)
+    picked = [(each, fit) for each in _diverse(screened)]
+    if is_far:
+        progress("screen", 0.5, "again, from the nominal model")
+        far = Fit.at(fit.space, np.r_[nominal.z, fit.z[nominal.z.size :]], segments)
+        known = {each.candidate for each, _ in picked}
+        new = [
+            each
+            for each in _diverse(screen(far, candidates, segments))
+            if each.candidate not in known
+        ]
+        picked += [(each, far) for each in new[:_MORE]]
+    found: list[Rough] = []
+    for index, (each, begun) in enumerate(picked):
+        progress("refit", index / len(picked), each.candidate.label)
+        found.append(refit(fit, nominal, each, segments, begun))
+    found.sort(key=lambda entry: entry.ratio)
+    return screened, _of_turns(found, screened, fit, segments)
+
+
+def _of_turns(
+    found: list[Rough], screened: Sequence[Screened], fit: Fit, segments: tuple[int, ...]
+) -> list[Rough]:
+    """Return refits, best first, with that of an interval if a delay like its mean is the best."""
+    if not found:
+        return found
+    best = found[0].screened.candidate
+    for each in screened:
+        name = each.candidate.effect.name
+        if LATE.get(name) != best.effect.name or each.candidate.place != best.place:
+            continue
+        late = refit_late(found[0], each, fit, segments)
+        before = [one for one in found if one.screened.candidate == each.candidate]
+        others = [one for one in found if one.screened.candidate != each.candidate]
+        better = min([late, *before], key=lambda one: one.ratio)
+        return sorted([*others, better], key=lambda one: one.ratio)
+    return found
+
+
+def _diverse(screened: Sequence[Screened]) -> list[Screened]:
+    """Return the best few, not all of one effect."""
+    counts: dict[str, int] = {}
+    out: list[Screened] = []
+    for each in screened:
+        name = each.candidate.effect.name
+        counts[name] = counts.get(name, 0) + 1
+        is_slight = each.share < max(_SLIGHT, _SLIGHT_BESIDE * screened[0].share)
+        if counts[name] <= _PER_EFFECT and not is_slight:
+            out.append(each)
+        if len(out) == _TRIED:
+            break
+    return out

@@ -1,0 +1,106 @@
+"""A search while it goes on: what was looked at and tried, what was taken, and what judges it."""
+
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from shared.identification.dataset.types import Float64
+from shared.identification.effect import Candidate
+from shared.identification.fit import Fit, Start
+from shared.identification.gate import Gain, compare
+from shared.identification.left_out import left_out
+from shared.identification.problem import Problem
+from shared.identification.screen import Screened
+
+ALIKE = 0.02
+"""Of a cause's gain: what does as well within this is not told from it."""
+ONCE = "external_contact"
+"""The effect that is in one recording."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A candidate that was refitted."""
+
+    screened: Screened
+    fit: Fit
+    gain: Gain
+    losses: Float64
+    """float64[S] of held-out stretches."""
+    is_event: bool = False
+    """Whether it happened once, in a recording that was fitted to, and explains what stood out."""
+    is_relative: bool = False
+    """Whether it was found at a joint because most others have it."""
+
+    @property
+    def candidate(self) -> Candidate:
+        """Return which."""
+        return self.screened.candidate
+
+    @property
+    def numbers(self) -> int:
+        """Return how many numbers the effect has."""
+        return len(self.screened.start)
+
+
+@dataclass
+class Search:
+    """A search while it goes on, and what it found."""
+
+    problem: Problem
+    rng: np.random.Generator
+    candidates: tuple[Candidate, ...]
+    ruled_out: dict[str, str]
+    doubted: tuple[str, ...]
+    """Parameters that were taken out of the base because they went further than is believable."""
+    base: Fit
+    """Without any cause, on whole recordings."""
+    nominal: Start
+    """Where refits begin a second time."""
+    parts: Fit
+    """With what was accepted, on short parts: where is looked."""
+    current: Fit
+    """The same on whole recordings: where is judged."""
+    nominal_losses: Float64
+    base_losses: Float64
+    current_losses: Float64
+    screened: dict[str, Screened] = field(default_factory=dict[str, Screened])
+    """Every candidate's best, from the first round."""
+    tried: dict[str, Tried] = field(default_factory=dict[str, Tried])
+    accepted: list[Tried] = field(default_factory=list[Tried])
+    rivals: list[tuple[Tried, ...]] = field(default_factory=list[tuple[Tried, ...]])
+    """For each accepted cause, what the data do not tell from it."""
+
+
+class Model(NamedTuple):
+    """A fit, and what it leaves of what nothing was fitted to."""
+
+    fit: Fit
+    losses: Float64
+    """float64[S] of held-out stretches."""
+
+
+def so_far(found: Search) -> Model:
+    """Return what there is so far."""
+    return Model(found.current, found.current_losses)
+
+
+def judged(found: Search, candidate: Candidate, before: Model, after: Model) -> Gain:
+    """Return what a cause takes off what was held out, and how sure that is.
+
+    All recordings make it surer, those that were fitted to with the size that the others give it;
+    what nothing was fitted to has to speak for it by more than its standard error all the same.
+    Of what happened once in one of them nothing is sure, see ``search.py``.
+    """
+    gain = compare(before.losses, after.losses, found.rng)
+    more = left_out(before.fit, after.fit, candidate, found.problem.of("train"))
+    whole = compare(
+        np.concatenate([before.losses, more.before]),
+        np.concatenate([after.losses, more.after]),
+        found.rng,
+    )
+    surely = max(gain.surely, min(whole.surely, gain.gain - gain.error))
+    if candidate.effect.name == ONCE:
+        surely = -np.inf  # there it only frees the base, of whatever it is
+    return replace(gain, surely=surely, is_measured=found.problem.noise.is_measured)
