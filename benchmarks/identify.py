@@ -15,7 +15,7 @@ from benchmarks.harness import ROOT
 from benchmarks.identification.protocol import protocol, smoke
 from benchmarks.identification.running import PROCESSES, run
 from benchmarks.identification.table import checks_of, confusion, confusion_text, curve
-from services.jobs.bench import RESULTS, Check, Measurement, add_row, report_of, text_of
+from services.jobs.bench import RESULTS, Check, Measurement, keep, report_of, text_of
 from shared.errors import RiposteError
 from shared.runtime.build import commit
 
@@ -107,9 +107,7 @@ def main() -> int:
     print(text_of(report))
     if found.write:
         words = [word for word in sys.argv[1:] if word != "--write"]
-        add_row(ROOT / "benchmarks" / RESULTS, report, shlex.join(
-            ["python", "-m", "benchmarks.identify", *words, "--write"]
-        ))  # fmt: skip
+        keep(report, shlex.join(["python", "-m", "benchmarks.identify", *words, "--write"]))
     return 0
 
 

@@ -19,7 +19,7 @@ from typing import Any
 from benchmarks import exploitability, phase_one
 from benchmarks.harness import ROOT
 from benchmarks.seeds import t_interval
-from services.jobs.bench import RESULTS, Check, Measurement, add_row, report_of, text_of
+from services.jobs.bench import Check, Measurement, keep, report_of, text_of
 from services.jobs.settings import Settings
 from shared.errors import RiposteError
 from shared.policy.players import scripted_player
@@ -134,7 +134,7 @@ def _keep(what: str, report: dict[str, Any], command: str) -> None:
         kept = json.loads(KEPT.read_text(encoding="utf-8"))
     kept[what] = report | {"command": command}
     KEPT.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
-    add_row(KEPT.with_name(RESULTS), report, command)
+    keep(report, command)
 
 
 if __name__ == "__main__":

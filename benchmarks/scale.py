@@ -22,7 +22,7 @@ from benchmarks.scaling.kept import KeptRuns
 from benchmarks.scaling.measure import Found
 from benchmarks.scaling.measure import measure as run_plan
 from benchmarks.scaling.plan import BUSY, FULL, SMOKE, Plan
-from services.jobs.bench import RESULTS, Check, Measurement, add_row, report_of, text_of
+from services.jobs.bench import Check, Measurement, keep, report_of, text_of
 from shared.runtime.files import atomic_write
 from shared.runtime.logging import configure_logging
 
@@ -114,7 +114,7 @@ def main() -> None:
         atomic_write(MEASURED, msgspec.json.format(msgspec.json.encode(kept)) + b"\n")
         document.write(ROOT / "docs", kept)
         plan = "" if words.plan == "full" else f" --plan {words.plan}"
-        add_row(MEASURED.parents[1] / RESULTS, report, f"python -m benchmarks.scale{plan} --write")
+        keep(report, f"python -m benchmarks.scale{plan} --write")
 
 
 if __name__ == "__main__":

@@ -28,6 +28,8 @@ from shared.runtime.process import THREAD_LIMITS
 QUIET_LOAD = 0.5
 """Load average per core above which a row says that the machine was busy."""
 RESULTS = "RESULTS.md"
+PICTURE = Path("docs", "images", "benchmarks.png")
+"""Of the table, in the checkout."""
 TABLE_HEAD = """# Measured
 
 A row is what one command printed on one machine; `riposte bench NAME --write` and
@@ -139,7 +141,7 @@ def main(argv: Sequence[str]) -> int:
         return 0
     print(msgspec.json.encode(report).decode() if found.json else text_of(report))
     if found.write:
-        add_row(folder / RESULTS, report, f"riposte bench {found.name}")
+        keep(report, f"riposte bench {found.name}")
     missed = not all(check["met"] for check in (report["goal"], *report["checks"]))
     return 1 if missed and not found.smoke else 0
 
@@ -279,6 +281,18 @@ def _value(check: dict[str, Any]) -> str:
     if check["low"] is None:
         return f"{figure(check['value'])}{unit}"
     return f"{figure(check['value'])} [{figure(check['low'])}, {figure(check['high'])}]{unit}"
+
+
+def keep(report: dict[str, Any], command: str) -> None:
+    """Add what was measured to the checkout's table of results, and draw its picture anew.
+
+    Args:
+        report: of ``run``.
+        command: that repeats it.
+    """
+    table = benchmarks_folder() / RESULTS
+    add_row(table, report, command)
+    importlib.import_module("benchmarks.picture").draw(table, SOURCE_ROOT / PICTURE)
 
 
 def add_row(path: Path, report: dict[str, Any], command: str) -> None:
