@@ -10,6 +10,8 @@ from shared.sim.plant.structure import Structure
 
 Side = Literal["command", "plant", "joints", "tracker"]
 """Whether a cause changes what reaches the controller, how the arm moves, or what is logged."""
+ONCE = "external_contact"
+"""The effect that is in one recording, for a while."""
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,8 @@ WINDOW = 1.0
 """Of the parts that a fit begins with (s)."""
 _ENOUGH = 1e-3
 """A step that takes off less than this share of the cost is the last one."""
+_BEYOND = 0.01
+"""A step that takes off less than this share of what is beyond noise is the last one of a base."""
 _DAMPINGS = (1e-3, 1e-1, 1.0, 100.0)
 """Factors of Marquardt's damping that are tried at once."""
 _MENDED = 6
@@ -66,6 +68,7 @@ def polish(
     steps: int = _MAX_STEPS,
     enough: float = _ENOUGH,
     known: tuple[Float64, Float64] | None = None,
+    beyond: float = 0.0,
 ) -> Fit:
     """Return a local fit by Levenberg-Marquardt steps within bounds.
 
@@ -78,12 +81,16 @@ def polish(
         steps: the most derivatives after the first.
         enough: what takes off less than this share of the cost with a new derivative is the end.
         known: residual and derivative at the start, if they are known.
+        beyond: the same as ``enough``, of the cost that is beyond noise: what lacks a cause is not
+            worth the way to its very best.
     """
     z = space.clip(start)
     fit = Fit.at(space, z, segments) if known is None else Fit.of(space, z, *known)
     for _ in range(steps):
         found = go_down(fit, segments)
-        if not found.cost < fit.cost * (1 - enough):
+        noise = 0.5 * (len(fit.residual) - space.size)
+        least = max(enough * fit.cost, beyond * (fit.cost - noise))
+        if not found.cost < fit.cost - least:
             break
         fit = Fit.at(space, found.z, segments)
     return fit
@@ -158,8 +165,6 @@ class BaseFits:
     """On short parts."""
     parts: Fit
     whole: Fit
-    searched: Float64
-    """float64[n], where the search led that began elsewhere."""
 
 
 def floor_from_base(space: Space) -> Noise:
@@ -198,7 +203,7 @@ def fit_again(space: Space, saved: SavedFits) -> BaseFits:
     nominal = Start(origin, parts.jacobian(origin, pieces)[1])
     begun = Fit.at(parts, np.array(saved.parts), pieces)
     whole = Fit.at(space, np.array(saved.whole), problem.of("train"))
-    return BaseFits(nominal, begun, replace(whole, starts_agree=saved.starts_agree), whole.z)
+    return BaseFits(nominal, begun, replace(whole, starts_agree=saved.starts_agree))
 
 
 def fit_base(space: Space, rng: np.random.Generator) -> BaseFits:
@@ -221,37 +226,47 @@ def fit_base(space: Space, rng: np.random.Generator) -> BaseFits:
 
     origin = np.zeros(space.size)
     searched = minimize(losses, origin, *space.bounds, sigma=0.3, seed=seed)
-    return _fitted(space, origin, searched)
+    return _fitted(space, searched)
 
 
 def fit_without(space: Space, done: BaseFits, doubted: Sequence[int]) -> BaseFits:
-    """Return the base's fit without parameters that it had, from where it was with them.
+    """Return the base's fit without parameters that it had, from its best with them.
 
     Args:
         space: without them.
         done: with them.
         doubted: which of its coordinates they were.
     """
-    begun, searched = (np.delete(z, doubted) for z in (done.parts.z, done.searched))
-    return _fitted(space, begun, searched)
+    begun, best = (np.delete(fit.z, doubted) for fit in (done.parts, done.whole))
+    segments = space.problem.of("train")
+    nominal, parts = _on_parts(space, begun)
+    is_same = parts.space.problem is space.problem
+    whole = parts if is_same else polish(space, best, segments, 6, beyond=_BEYOND)
+    whole = replace(whole, starts_agree=done.whole.starts_agree)
+    return BaseFits(nominal, whole if is_same else parts, whole)
 
 
-def _fitted(space: Space, near: Float64, searched: Float64) -> BaseFits:
-    """Return the better one of two fits: from ``near`` by way of short parts, and directly."""
+def _fitted(space: Space, searched: Float64) -> BaseFits:
+    """Return the better one of two fits: from nominal by way of short parts, and directly."""
     problem = space.problem
     segments = problem.of("train")
-    parts = Space(problem.in_parts(WINDOW), space.candidates)
-    origin = np.zeros(space.size)
-    pieces = parts.problem.of("train")
-    residual, jacobian = parts.jacobian(origin, pieces)
-    nominal = Start(origin, jacobian)
-    known = None if near.any() else (residual, jacobian)
-    begun = polish(parts, near, pieces, 6, known=known)
-    is_same = parts.problem is problem
+    nominal, begun = _on_parts(space, np.zeros(space.size))
+    is_same = begun.space.problem is problem
     fits = [
-        begun if is_same else polish(space, begun.z, segments, 6),
-        polish(space, searched, segments, 6),
+        begun if is_same else polish(space, begun.z, segments, 6, beyond=_BEYOND),
+        polish(space, searched, segments, 6, beyond=_BEYOND),
     ]
     best = min(fits, key=lambda fit: fit.cost)
     agree = max(fit.cost for fit in fits) <= best.cost * (1 + AGREE) + 1.0
-    return BaseFits(nominal, begun, replace(best, starts_agree=agree), fits[1].z)
+    best = replace(best, starts_agree=agree)
+    return BaseFits(nominal, best if is_same else begun, best)
+
+
+def _on_parts(space: Space, near: Float64) -> tuple[Start, Fit]:
+    """Return the derivative at the nominal model, and the fit from ``near``, on short parts."""
+    parts = Space(space.problem.in_parts(WINDOW), space.candidates)
+    origin, pieces = np.zeros(space.size), parts.problem.of("train")
+    residual, jacobian = parts.jacobian(origin, pieces)
+    known = None if near.any() else (residual, jacobian)
+    begun = polish(parts, near, pieces, 6, known=known, beyond=_BEYOND)
+    return Start(origin, jacobian), begun

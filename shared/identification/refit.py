@@ -1,8 +1,9 @@
 """Fits an effect together with the whole base model, without paying for its derivative again.
 
 A base fit that lacks the cause has bent its parameters towards it, and the way back is not
-straight. So a refit begins twice, at the base's fit and at the nominal model, each with the
-derivative that was computed there, and mends it as it goes (Broyden 1965). The few candidates
+straight. So, where noise does not account for what is left, a refit begins twice, at the base's fit
+and at the nominal model, each with the derivative that was computed there, and mends it as it goes
+(Broyden 1965). The few candidates
 that remain in the running get a full fit.
 """
 
@@ -13,8 +14,7 @@ from numpy.typing import NDArray
 
 from shared.identification.dataset.types import Float64
 from shared.identification.fit import Fit, Start, damped, go_down
-from shared.identification.problem import Problem
-from shared.identification.screen import Screened
+from shared.identification.screen import Screened, rows_of
 from shared.identification.space import Space
 from shared.identification.turns import LIKELY, NEAR, aligned, turning_of
 
@@ -25,6 +25,8 @@ _MENDING = (1e-4, 1e-2, 1.0)
 _PARTS = (1.0, 0.5, 0.25)
 """Of the way to where the screen expects the best fit, for a start."""
 _ENOUGH = 0.01
+_BENT = 1.5
+"""Mean square residual, in noise floors, from which the base may be bent towards a cause."""
 _EVERY = 2
 """One in so many parts is enough for a rough look."""
 
@@ -57,7 +59,7 @@ def refit(
     quantities = screened.candidate.effect.quantities(problem.subject, screened.candidate.place)
     is_local = not all(quantity.is_smooth for quantity in quantities)
     picked = segments if is_local else segments[::_EVERY]
-    rows = _rows(problem, segments, picked)
+    rows = rows_of(problem, segments, picked)
     extra = space.size - fit.space.size
     way: Float64 = np.concatenate([screened.shift, screened.start])
     origin: Float64 = np.concatenate([begun.z, np.zeros(extra)])
@@ -69,16 +71,30 @@ def refit(
         there[is_form] = way[is_form]
         ways.append(space.clip(there))
     ways.append(space.clip(np.r_[begun.z, screened.start]))
-    first = _descend(space, ways, begun.jacobian[: len(rows)][rows], picked, fit.space.size)
+    found = [_descend(space, ways, begun.jacobian[: len(rows)][rows], picked, fit.space.size)]
+    turns = any(quantity.phase for quantity in quantities)
+    if turns or not problem.noise.is_measured or 2.0 * fit.cost > _BENT * len(rows):
+        found.append(_from_nominal(fit, nominal, screened, picked, rows))
+    z, cost = _mended(space, *min(found, key=lambda one: one[1]), picked)
+    before = 0.5 * float(np.sum(fit.residual[: len(rows)][rows] ** 2))
+    return Rough(screened, space, z, cost / max(before, 1e-12))
+
+
+def _from_nominal(
+    fit: Fit, nominal: Start, screened: Screened, picked: tuple[int, ...], rows: NDArray[np.bool_]
+) -> tuple[Float64, float]:
+    """Return where a refit comes to that begins at the nominal model."""
+    space = fit.space.grown(screened.candidate)
+    quantities = screened.candidate.effect.quantities(
+        fit.space.problem.subject, screened.candidate.place
+    )
+    is_form = np.array([bool(each.grid) for each in quantities])
     base = np.r_[nominal.z, fit.z[nominal.z.size :]]
-    half = np.where(is_form[-extra:], screened.start, 0.5 * screened.start)
+    half = np.where(is_form, screened.start, 0.5 * screened.start)
     sizes = [space.clip(np.r_[base, size]) for size in (screened.start, half)]
     kept = nominal.jacobian[: len(rows)][rows]
     sizes[0] = aligned(space, sizes[0], picked, base=kept)
-    second = _descend(space, sizes, kept, picked, nominal.z.size)
-    z, cost = _mended(space, *min((first, second), key=lambda found: found[1]), picked)
-    before = 0.5 * float(np.sum(fit.residual[: len(rows)][rows] ** 2))
-    return Rough(screened, space, z, cost / max(before, 1e-12))
+    return _descend(space, sizes, kept, picked, nominal.z.size)
 
 
 def refit_late(late: Rough, screened: Screened, fit: Fit, segments: tuple[int, ...]) -> Rough:
@@ -113,16 +129,6 @@ def _mended(
     return (tries[best], float(costs[best])) if costs[best] < cost else (z, cost)
 
 
-def _rows(
-    problem: Problem, segments: tuple[int, ...], picked: tuple[int, ...]
-) -> NDArray[np.bool_]:
-    """Return which rows of a derivative on segments are of those picked."""
-    wanted = set(picked)
-    return np.concatenate(
-        [np.full(problem.size_of(segment), segment in wanted) for segment in segments]
-    )
-
-
 def _descend(
     space: Space, starts: list[Float64], kept: Float64, segments: tuple[int, ...], known: int
 ) -> tuple[Float64, float]:
@@ -148,9 +154,16 @@ def settle(space: Space, start: Float64, segments: tuple[int, ...]) -> Fit:
     """
     before = _in_turn(Fit.at(space, space.clip(start), segments), segments)
     found = go_down(before, segments, _DAMPINGS)
-    if found.cost > before.cost * (1 - _ENOUGH):
+    if found.cost > before.cost * (1 - _ENOUGH) or _is_there(found):
         return found
     return go_down(Fit.at(space, found.z, segments), segments, _DAMPINGS)
+
+
+def _is_there(fit: Fit) -> bool:
+    """Return whether a fit's derivative, mended on the way, promises hardly anything more."""
+    z = damped(fit.space, fit.z, fit.residual, fit.jacobian, [_MENDING[0]])[0]
+    left = fit.residual + fit.jacobian @ (z - fit.z)
+    return 0.5 * float(left @ left) > fit.cost * (1 - _ENOUGH)
 
 
 def _in_turn(fit: Fit, segments: tuple[int, ...]) -> Fit:

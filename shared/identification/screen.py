@@ -10,16 +10,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shared.identification.dataset.types import Float64
-from shared.identification.effect import Candidate, Effect, Quantity
+from shared.identification.effect import ONCE, Candidate, Effect, Quantity
 from shared.identification.fit import Fit
 from shared.identification.linear import bounded, least_squares
-from shared.identification.problem import Variant
+from shared.identification.problem import Problem, Variant
 from shared.identification.subject import Subject
 
 GRID = (0.25, 0.5, 1.0, 2.0, 4.0)
 """Sizes, in probes, at which an effect that is not smooth is looked at."""
+_EVERY = 2
+"""One in so many parts shows what acts all the time."""
+_MANY = 8
+"""Parts, at least, of which some are left out."""
 _NEAR = 2.0
 """An effect that acts from some size on is looked at where it does no more than twice too much."""
 
@@ -36,7 +41,8 @@ class Screened:
     share: float
     """Of the training residual that it takes off."""
     signature: Float64
-    """float64[M + n], of unit length, what the base cannot absorb of it; empty if nothing."""
+    """float64[K], of unit length, what the base cannot absorb of it in some rows of the residual,
+    the same ones for all candidates; empty if nothing."""
 
 
 def candidates_of(
@@ -57,7 +63,54 @@ def candidates_of(
 
 
 def screen(fit: Fit, candidates: Sequence[Candidate], segments: tuple[int, ...]) -> list[Screened]:
-    """Return every candidate that explains anything, best first."""
+    """Return every candidate that explains anything, best first.
+
+    Args:
+        fit: what is there so far, on the segments.
+        candidates: what is looked for.
+        segments: recordings, or parts of them. Of many, every second one has to do for what acts
+            all the time.
+    """
+    picked = segments[::_EVERY] if len(segments) >= _MANY else segments
+    rows = rows_of(fit.space.problem, segments, picked)
+    steady = [each for each in candidates if _is_steady(fit.space.problem.subject, each)]
+    local = [each for each in candidates if each not in set(steady)]
+    found = [
+        *_screened(_on(fit, rows), steady, picked, None),
+        *_screened(fit, local, segments, rows),
+    ]
+    return sorted(found, key=lambda each: -each.share)
+
+
+def _is_steady(subject: Subject, candidate: Candidate) -> bool:
+    """Return whether a candidate acts in all recordings, and at any size."""
+    found = candidate.effect.quantities(subject, candidate.place)
+    return candidate.effect.name != ONCE and all(each.is_smooth for each in found)
+
+
+def rows_of(
+    problem: Problem, segments: tuple[int, ...], picked: tuple[int, ...]
+) -> NDArray[np.bool_]:
+    """Return which rows of a derivative on segments are of those picked."""
+    wanted = set(picked)
+    return np.concatenate(
+        [np.full(problem.size_of(segment), segment in wanted) for segment in segments]
+    )
+
+
+def _on(fit: Fit, rows: NDArray[np.bool_]) -> Fit:
+    """Return a fit as some rows see it; what is known beforehand counts as it did."""
+    kept = np.r_[rows, np.ones(fit.space.size, np.bool_)]
+    return Fit.of(fit.space, fit.z, fit.residual[kept], fit.jacobian[kept])
+
+
+def _screened(
+    fit: Fit, candidates: Sequence[Candidate], segments: tuple[int, ...],
+    rows: NDArray[np.bool_] | None,
+) -> list[Screened]:  # fmt: skip
+    """Return every candidate at its best; signatures are of some rows only, if given."""
+    if not candidates:
+        return []
     problem, base = fit.space.problem, fit.space.variant(fit.z)
     basis, triangle = np.linalg.qr(fit.jacobian)
     left = fit.residual - basis @ (basis.T @ fit.residual)
@@ -73,14 +126,15 @@ def screen(fit: Fit, candidates: Sequence[Candidate], segments: tuple[int, ...])
             begun.append((look, slice(begin, len(variants))))
         looks.append(begun)
     found = _signatures(fit, variants, segments)
+    shown = slice(None) if rows is None else np.r_[rows, np.ones(fit.space.size, np.bool_)]
     out: list[Screened] = []
     for candidate, begun in zip(candidates, looks, strict=True):
         tried = [
-            _judge(candidate, found[rows].T, look, basis, triangle, left, fit, total)
-            for look, rows in begun
+            _judge(candidate, found[of].T, look, basis, triangle, left, fit, total, shown)
+            for look, of in begun
         ]
         out.append(max(tried, key=lambda each: each.share))
-    return sorted(out, key=lambda each: -each.share)
+    return out
 
 
 @dataclass(frozen=True)
@@ -136,7 +190,7 @@ def _signatures(fit: Fit, variants: Sequence[Variant], segments: tuple[int, ...]
 
 def _judge(
     candidate: Candidate, columns: Float64, look: _Look, basis: Float64, triangle: Float64,
-    left: Float64, fit: Fit, total: float,
+    left: Float64, fit: Fit, total: float, shown: slice | NDArray[np.bool_],
 ) -> Screened:  # fmt: skip
     bare = columns - basis @ (basis.T @ columns)
     size = np.linalg.norm(bare, axis=0)
@@ -153,7 +207,8 @@ def _judge(
     explained = bare @ best
     share = float(left @ left - (left + explained) @ (left + explained)) / max(total, 1e-12)
     shift = least_squares(triangle, -(basis.T @ (fit.residual + columns @ best)))
-    direction = explained / max(float(np.linalg.norm(explained)), 1e-12)
+    direction = explained[shown]
+    direction = direction / max(float(np.linalg.norm(direction)), 1e-12)
     start = look.form.copy()
     start[list(look.sizes)] = scale if look.is_level else best * scale
     return Screened(candidate, start, shift, share, direction)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from shared.identification.dataset.types import Float64
-from shared.identification.effect import Candidate
+from shared.identification.effect import ONCE, Candidate
 from shared.identification.family import Family, look_elsewhere, relatives
 from shared.identification.fewer import one_for_many, prune
 from shared.identification.fit import Fit, polish
@@ -11,7 +11,7 @@ from shared.identification.gate import LEAST_SHARE, compare, floor_of, stretches
 from shared.identification.look import look
 from shared.identification.progress import Progress
 from shared.identification.refit import settle
-from shared.identification.searched import ALIKE, ONCE, Model, Search, Tried, judged, so_far
+from shared.identification.searched import ALIKE, Model, Search, Tried, judged, so_far
 from shared.identification.space import Space
 from shared.identification.turns import LATE
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shared.identification.dataset.types import Float64
-from shared.identification.effect import Candidate
+from shared.identification.effect import ONCE, Candidate
 from shared.identification.fit import Fit, Start
 from shared.identification.gate import Gain, compare
 from shared.identification.left_out import left_out
@@ -15,8 +15,6 @@ from shared.identification.screen import Screened
 
 ALIKE = 0.02
 """Of a cause's gain: what does as well within this is not told from it."""
-ONCE = "external_contact"
-"""The effect that is in one recording."""
 
 
 @dataclass(frozen=True)
