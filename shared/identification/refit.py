@@ -1,9 +1,9 @@
 """Fits an effect together with the whole base model, without paying for its derivative again.
 
 A base fit that lacks the cause has bent its parameters towards it, and the way back is not
-straight. So, where noise does not account for what is left, a refit begins twice, at the base's fit
-and at the nominal model, each with the derivative that was computed there, and mends it as it goes
-(Broyden 1965). The few candidates
+straight. So a refit begins twice, at the base's fit and at the nominal model, each with the
+derivative that was computed there, and mends it as it goes (Broyden 1965); beside an accepted cause
+with which hardly more than noise is left, only once. The few candidates
 that remain in the running get a full fit.
 """
 
@@ -72,8 +72,9 @@ def refit(
         ways.append(space.clip(there))
     ways.append(space.clip(np.r_[begun.z, screened.start]))
     found = [_descend(space, ways, begun.jacobian[: len(rows)][rows], picked, fit.space.size)]
-    turns = any(quantity.phase for quantity in quantities)
-    if turns or not problem.noise.is_measured or 2.0 * fit.cost > _BENT * len(rows):
+    is_plain = bool(fit.space.candidates) and not any(each.phase for each in quantities)
+    is_near = problem.noise.is_measured and 2.0 * fit.cost < _BENT * len(rows)
+    if not (is_plain and is_near):
         found.append(_from_nominal(fit, nominal, screened, picked, rows))
     z, cost = _mended(space, *min(found, key=lambda one: one[1]), picked)
     before = 0.5 * float(np.sum(fit.residual[: len(rows)][rows] ** 2))

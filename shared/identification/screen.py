@@ -22,9 +22,11 @@ from shared.identification.subject import Subject
 GRID = (0.25, 0.5, 1.0, 2.0, 4.0)
 """Sizes, in probes, at which an effect that is not smooth is looked at."""
 _EVERY = 2
-"""One in so many parts shows what acts all the time."""
+"""One in so many parts shows what acts all the time, where it is plain."""
 _MANY = 8
 """Parts, at least, of which some are left out."""
+_PLAIN = 10.0
+"""Mean square residual, in noise floors, from which that will do: what is small takes all."""
 _NEAR = 2.0
 """An effect that acts from some size on is looked at where it does no more than twice too much."""
 
@@ -69,9 +71,10 @@ def screen(fit: Fit, candidates: Sequence[Candidate], segments: tuple[int, ...])
         fit: what is there so far, on the segments.
         candidates: what is looked for.
         segments: recordings, or parts of them. Of many, every second one has to do for what acts
-            all the time.
+            all the time, if much is left.
     """
-    picked = segments[::_EVERY] if len(segments) >= _MANY else segments
+    is_plain = 2.0 * fit.cost > _PLAIN * len(fit.residual) and len(segments) >= _MANY
+    picked = segments[::_EVERY] if is_plain else segments
     rows = rows_of(fit.space.problem, segments, picked)
     steady = [each for each in candidates if _is_steady(fit.space.problem.subject, each)]
     local = [each for each in candidates if each not in set(steady)]
