@@ -22,7 +22,7 @@ from typing import Any, Literal
 import numpy as np
 
 from benchmarks.harness import process
-from benchmarks.training_run import ENDLESS, WARM_VERSION, training_run
+from benchmarks.training_run import ENDLESS, WARM_VERSION, TrainingRun, training_run
 from services.jobs.bench import Check, Measurement, report_of, text_of
 from services.jobs.play.match import Match, Terms
 from services.jobs.play.plan import Plan, parse, plan_of
@@ -173,14 +173,21 @@ def live_site() -> Iterator[Site]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def watched(seconds: float) -> dict[str, Any]:
-    """Return what was seen of the loop, of the bare round trip and of the training run."""
+def watched(seconds: float, *, is_alone: bool = False) -> dict[str, Any]:
+    """Return what was seen of the loop, of the bare round trip and of the training run.
+
+    Args:
+        seconds: how long.
+        is_alone: without a training run, on all cores.
+    """
     cores = sorted(os.sched_getaffinity(0))
     with contextlib.ExitStack() as stack:
-        with on_cores(cores[-1]):
-            training = stack.enter_context(training_run(ENDLESS))
-        training.wait_for_version(WARM_VERSION)
-        stack.enter_context(on_cores(cores[0]))
+        training: TrainingRun | None = None
+        if not is_alone:
+            with on_cores(cores[-1]):
+                training = stack.enter_context(training_run(ENDLESS))
+            training.wait_for_version(WARM_VERSION)
+            stack.enter_context(on_cores(cores[0]))
         site = stack.enter_context(live_site())
         site.until_fencing()
         assert site.states is not None
@@ -193,7 +200,7 @@ def watched(seconds: float) -> dict[str, Any]:
                 "-m", "benchmarks.echo", site.endpoint, "--ask", f"{seconds}", "--size", f"{size}"
             )
         )
-        first_version = training.newest_checkpoint()
+        first_version = training.newest_checkpoint() if training else 0
         before, began_at = site.fresh_status(), time.monotonic()
         site.gates.clear()
         while time.monotonic() < began_at + seconds:
@@ -208,7 +215,7 @@ def watched(seconds: float) -> dict[str, Any]:
             "bytes": size,
             "bouts": site.match.finished,
             "trips": site.trips,
-            "updates": training.newest_checkpoint() - first_version,
+            "updates": training.newest_checkpoint() - first_version if training else 0,
         }
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from benchmarks import round_trip
 from benchmarks.control import answer_times, measurement
 from shared.messages.play import GateState
 
@@ -41,3 +42,15 @@ def test_late_and_lost_ticks_count_alike_and_misses_are_shown():
     assert figures["bare round trips missed"] == 2
     assert figures["trips of the gate"] == 1
     assert found.runs[0]["ratio"] == 0.0
+
+
+def test_the_control_path_by_itself_is_a_multiple_of_the_bare_round_trip():
+    seen = {
+        "gates": [gate(tick, 0.5 + 0.01 * (tick % 3)) for tick in range(60)],
+        "counts": {"ticks": 60, "commands_repeated": 0}, "bytes": 500,
+        "bare": {"times_ms": [0.4] * 60, "missed": 0},
+    }  # fmt: skip
+    found = round_trip.measurement(seen)
+    assert found.ratio.value == pytest.approx(0.51 / 0.4)
+    assert found.ratio.is_met
+    assert len(found.runs) == round_trip.PARTS
