@@ -18,8 +18,6 @@ WINDOW = 1.0
 """Of the parts that a fit begins with (s)."""
 _ENOUGH = 1e-3
 """A step that takes off less than this share of the cost is the last one."""
-_BEYOND = 0.01
-"""A step that takes off less than this share of what is beyond noise is the last one of a base."""
 _DAMPINGS = (1e-3, 1e-1, 1.0, 100.0)
 """Factors of Marquardt's damping that are tried at once."""
 _MENDED = 6
@@ -68,7 +66,6 @@ def polish(
     steps: int = _MAX_STEPS,
     enough: float = _ENOUGH,
     known: tuple[Float64, Float64] | None = None,
-    beyond: float = 0.0,
 ) -> Fit:
     """Return a local fit by Levenberg-Marquardt steps within bounds.
 
@@ -81,16 +78,12 @@ def polish(
         steps: the most derivatives after the first.
         enough: what takes off less than this share of the cost with a new derivative is the end.
         known: residual and derivative at the start, if they are known.
-        beyond: the same as ``enough``, of the cost that is beyond noise: what lacks a cause is not
-            worth the way to its very best.
     """
     z = space.clip(start)
     fit = Fit.at(space, z, segments) if known is None else Fit.of(space, z, *known)
     for _ in range(steps):
         found = go_down(fit, segments)
-        noise = 0.5 * (len(fit.residual) - space.size)
-        least = max(enough * fit.cost, beyond * (fit.cost - noise))
-        if not found.cost < fit.cost - least:
+        if not found.cost < fit.cost * (1 - enough):
             break
         fit = Fit.at(space, found.z, segments)
     return fit
@@ -241,7 +234,7 @@ def fit_without(space: Space, done: BaseFits, doubted: Sequence[int]) -> BaseFit
     segments = space.problem.of("train")
     nominal, parts = _on_parts(space, begun)
     is_same = parts.space.problem is space.problem
-    whole = parts if is_same else polish(space, best, segments, 6, beyond=_BEYOND)
+    whole = parts if is_same else polish(space, best, segments, 6)
     whole = replace(whole, starts_agree=done.whole.starts_agree)
     return BaseFits(nominal, whole if is_same else parts, whole)
 
@@ -253,8 +246,8 @@ def _fitted(space: Space, searched: Float64) -> BaseFits:
     nominal, begun = _on_parts(space, np.zeros(space.size))
     is_same = begun.space.problem is problem
     fits = [
-        begun if is_same else polish(space, begun.z, segments, 6, beyond=_BEYOND),
-        polish(space, searched, segments, 6, beyond=_BEYOND),
+        begun if is_same else polish(space, begun.z, segments, 6),
+        polish(space, searched, segments, 6),
     ]
     best = min(fits, key=lambda fit: fit.cost)
     agree = max(fit.cost for fit in fits) <= best.cost * (1 + AGREE) + 1.0
@@ -268,5 +261,5 @@ def _on_parts(space: Space, near: Float64) -> tuple[Start, Fit]:
     origin, pieces = np.zeros(space.size), parts.problem.of("train")
     residual, jacobian = parts.jacobian(origin, pieces)
     known = None if near.any() else (residual, jacobian)
-    begun = polish(parts, near, pieces, 6, known=known, beyond=_BEYOND)
+    begun = polish(parts, near, pieces, 6, known=known)
     return Start(origin, jacobian), begun
