@@ -45,11 +45,6 @@ class Row:
     also: tuple[Figure, ...]
     commit: str
 
-    @property
-    def is_met(self) -> bool:
-        """Return whether the goal was reached."""
-        return self.main.value >= self.goal if self.is_at_least else self.main.value <= self.goal
-
     def over(self, value: float) -> float:
         """Return how many times the goal a value is: over 1 is better than asked for.
 

@@ -235,8 +235,7 @@ def fit_without(space: Space, done: BaseFits, doubted: Sequence[int]) -> BaseFit
     nominal, parts = _on_parts(space, begun)
     is_same = parts.space.problem is space.problem
     whole = parts if is_same else polish(space, best, segments, 6)
-    whole = replace(whole, starts_agree=done.whole.starts_agree)
-    return BaseFits(nominal, whole if is_same else parts, whole)
+    return BaseFits(nominal, parts, replace(whole, starts_agree=done.whole.starts_agree))
 
 
 def _fitted(space: Space, searched: Float64) -> BaseFits:
@@ -251,8 +250,7 @@ def _fitted(space: Space, searched: Float64) -> BaseFits:
     ]
     best = min(fits, key=lambda fit: fit.cost)
     agree = max(fit.cost for fit in fits) <= best.cost * (1 + AGREE) + 1.0
-    best = replace(best, starts_agree=agree)
-    return BaseFits(nominal, best if is_same else begun, best)
+    return BaseFits(nominal, best if is_same else begun, replace(best, starts_agree=agree))
 
 
 def _on_parts(space: Space, near: Float64) -> tuple[Start, Fit]:

@@ -76,8 +76,9 @@ def screen(fit: Fit, candidates: Sequence[Candidate], segments: tuple[int, ...])
     is_plain = 2.0 * fit.cost > _PLAIN * len(fit.residual) and len(segments) >= _MANY
     picked = segments[::_EVERY] if is_plain else segments
     rows = rows_of(fit.space.problem, segments, picked)
-    steady = [each for each in candidates if _is_steady(fit.space.problem.subject, each)]
-    local = [each for each in candidates if each not in set(steady)]
+    subject = fit.space.problem.subject
+    steady = [each for each in candidates if _is_steady(subject, each)]
+    local = [each for each in candidates if not _is_steady(subject, each)]
     found = [
         *_screened(_on(fit, rows), steady, picked, None),
         *_screened(fit, local, segments, rows),

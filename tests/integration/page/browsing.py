@@ -15,8 +15,6 @@ FLAGS = (
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1, EXCLUDE localhost",
 )  # fmt: skip
 
-ARMED = ("ramping", "armed", "holding")
-"""Modes of the gate in which the robot may move."""
 POLL_SECONDS = 0.04
 """Between two looks at the page, which cost more than what they look at."""
 
@@ -57,7 +55,7 @@ class Player:
         """Click until the robot is armed: a refusal, such as for a late policy, is asked again."""
 
         def is_armed() -> bool:
-            if self.read("frame()?.gate.mode") in ARMED:
+            if self.read("frame()?.gate.mode") in ("ramping", "armed", "holding"):
                 return True
             if self.read("action()") == "arm":
                 self.press()
