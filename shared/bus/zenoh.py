@@ -19,7 +19,7 @@ The client reconnects by itself within half a second of a router's return, but n
 import contextlib
 import secrets
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeAlias, TypeVar
 
 import structlog
@@ -131,7 +131,7 @@ class ZenohBus:
             clock, self._counts, self._news.set, cfg.inbox_messages, cfg.inbox_mib << 20
         )
         self._watchdog = Watchdog(
-            cfg, clock, session, _has_router, lambda: _try_open(config), close_session
+            cfg, clock, session, _has_router, lambda: _try_open(config), self._close
         )
         self._declared: dict[object, tuple[Declare, Any]] = {}
         self._present: dict[str, Present] = {}
@@ -314,6 +314,9 @@ class ZenohBus:
                 entity = declare(session)
         self._declared[owner] = (declare, entity)
 
+    def _close(self, session: zenoh.Session) -> None:
+        close_session(session, [entity for _, entity in list(self._declared.values()) if entity])
+
     def _undeclare(self, owner: object) -> None:
         _, entity = self._declared.pop(owner, (None, None))
         if entity is not None:
@@ -382,10 +385,17 @@ def _try_open(config: str) -> zenoh.Session | None:
     return None
 
 
-def close_session(session: zenoh.Session) -> None:
-    """Close a session, at most ``CLOSE_SECONDS`` long."""
+def close_session(session: zenoh.Session, declared: Iterable[Any] = ()) -> None:
+    """Close a session, at most ``CLOSE_SECONDS`` long.
+
+    What was ``declared`` in it goes first: of what still comes for that, a session that is being
+    closed knows the key no more, and says so as an error on stdout.
+    """
 
     def close() -> None:
+        for entity in declared:
+            with contextlib.suppress(zenoh.ZError):
+                entity.undeclare()
         with contextlib.suppress(zenoh.ZError):
             session.close()
 

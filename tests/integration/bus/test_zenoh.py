@@ -25,7 +25,8 @@ from shared.bus.zenoh import open_zenoh
 from shared.clock import SystemClock
 from shared.errors import BusError
 from shared.messages.league import Incident, Lease, LeaseRequest, Schedule
-from shared.messages.topics import INCIDENT, LEASE, ROLLOUT, SCHEDULE
+from shared.messages.live import ServiceStatus
+from shared.messages.topics import INCIDENT, LEASE, ROLLOUT, SCHEDULE, STATUS
 from shared.messages.training import ACTION_DIM, OBS_DIM, Receipt, Rollout
 from shared.messages.wire import encode
 
@@ -156,6 +157,40 @@ def test_wait_ends_when_something_arrives(zenoh_world: Any) -> None:
     assert reader.wait(10.0)
     assert time.monotonic() - began_at < 3.0
     assert values.take() == a_schedule(1)
+
+
+def test_leaving_in_the_middle_of_streams_prints_nothing(
+    zenoh_world: Any, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """What a command prints is read by other programs, and Zenoh says its errors on stdout."""
+    said = [
+        ServiceStatus(role="actor", name=f"actor-{one}", boot="b", pid=1, host="h", state="playing")
+        for one in range(8)
+    ]
+    is_over = threading.Event()
+
+    def write(name: str) -> None:
+        writer = zenoh_world.join(name)
+        while not is_over.is_set():
+            for status in said:
+                writer.publish(STATUS, status, role="actor", name=status.name)
+            time.sleep(0.0002)
+
+    threads = [threading.Thread(target=write, args=(f"writer-{one}",)) for one in range(3)]
+    for thread in threads:
+        thread.start()
+    try:
+        for number in range(20):
+            reader = zenoh_world.join(f"reader-{number}")
+            values = [reader.subscribe(STATUS, role="actor", name=one.name) for one in said]
+            assert reader.wait(5.0)
+            reader.close()
+            assert any(one.take() is not None for one in values)
+    finally:
+        is_over.set()
+        for thread in threads:
+            thread.join()
+    assert "ERROR" not in "".join(capfd.readouterr())
 
 
 def test_runs_do_not_see_each_other(shared_router: Any, zenoh_world: Any) -> None:
