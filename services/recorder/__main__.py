@@ -15,6 +15,7 @@ from shared.clock import Clock
 from shared.errors import ConfigError
 from shared.game.rules import RuleBook
 from shared.policy.action import ActionConfig
+from shared.runtime.process import give_way
 from shared.runtime.serve import ServeArgs, open_site_bus, serve
 from shared.runtime.service import StatusReporter
 from shared.sim.config import SimConfig
@@ -74,6 +75,7 @@ def run(service: Recorder, bus: Bus, clock: Clock, args: ServeArgs, stop: thread
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the recorder; return its exit code."""
+    give_way()
     return serve("recorder", build, argv, open_bus=open_bus, loop=run)
 
 

@@ -95,6 +95,11 @@ class RobotIo:
         self._is_open = False
         """Whether this tick's command has not gone out yet."""
         self._began_at = now
+        self._read_at = now
+        self._read_ns = 0
+        """The same, of the wall's clock."""
+        self._is_sound = False
+        """Whether this tick's state of the robot is made of numbers."""
         self._lateness_ms = 0.0
         self._answer_ms: float | None = None
         self._answered_tick: int | None = None
@@ -163,27 +168,28 @@ class RobotIo:
         self._tracked = tracked
         if self._parts.person is not None and self._tracked.is_valid:
             self._parts.person.place_person(self._tracked.state)
+        self._read_at, self._read_ns = self._clock.now(), self._clock.wall_ns()
         self._publish_states(now)
         self._is_open = True
 
     def _publish_states(self, now: float) -> None:
         robot, tracked = self._robot, self._tracked
         both = self._both_tools(robot)
-        is_sound = bool(np.isfinite(robot.bat).all() and np.isfinite(both).all())
-        if is_sound:
+        self._is_sound = bool(np.isfinite(robot.bat).all() and np.isfinite(both).all())
+        if self._is_sound:
             self._bat = robot.bat
             self._tools[self._tick] = both
             if len(self._tools) > REMEMBERED_TICKS:
                 self._tools.popitem(last=False)
         hold = self._parts.gate.cfg.state_hold
-        is_valid = [tracked.is_valid, is_sound and now - robot.at <= hold]
+        is_valid = [tracked.is_valid, self._is_sound and now - robot.at <= hold]
         tools = self._tools.get(self._tick, np.zeros((2, 7)))
         self._bus.publish(
             BATS,
             BatStates(
                 tick=self._tick,
                 boot=self._bus.boot,
-                at_ns=self._clock.wall_ns(),
+                at_ns=self._read_ns,
                 bats=np.array([tracked.state, self._bat]),
                 tools=tools,
                 is_valid=np.array(is_valid),
@@ -192,9 +198,13 @@ class RobotIo:
                 tracker_sequence=tracked.sequence,
             ),
         )
-        if is_sound:
+
+    def _publish_robot(self) -> None:
+        """Say what nobody answers, once the command is out."""
+        robot = self._robot
+        if self._is_sound:
             self._publish_arms(robot)
-        report = report_of(robot, self._tick, self._bus.boot, now, self._clock.wall_ns())
+        report = report_of(robot, self._tick, self._bus.boot, self._read_at, self._read_ns)
         self._bus.publish(ROBOT, report)
 
     def _both_tools(self, robot: RobotState) -> Floats:
@@ -270,12 +280,13 @@ class RobotIo:
             self._parts.link.write(self._commanded)
             self._counters["commands_sent"] += 1
             if command is not None:
-                self._answer_ms = 1e3 * (self._clock.now() - self._began_at)
+                self._answer_ms = 1e3 * (self._clock.now() - self._read_at)
                 self._answered_tick = self._answered[PROTAGONIST]
                 self._answer.add(self._answer_ms)
         self._counters["commands_clipped"] += output.is_clipped
         self._note(before)
         self._publish_gate(output)
+        self._publish_robot()
 
     def _publish_gate(self, output: GateOutput) -> None:
         state = GateState(

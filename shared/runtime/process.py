@@ -1,7 +1,9 @@
 """What a process knows of itself and does with its children; Linux."""
 
+import contextlib
 import ctypes
 import dataclasses
+import os
 import resource
 import subprocess
 from collections.abc import Iterable
@@ -46,6 +48,15 @@ def release_memory() -> None:
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)
+
+
+def give_way() -> None:
+    """Let this process, and the threads it begins from now on, wake behind what runs (sched(7)).
+
+    For what nobody waits for, beside what somebody does: its share of a busy machine stays.
+    """
+    with contextlib.suppress(OSError):  # where that is not allowed, it does its work all the same
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
 def end(children: Iterable["subprocess.Popen[Any]"], seconds: float) -> None:

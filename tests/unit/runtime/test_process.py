@@ -1,4 +1,4 @@
-"""Child processes end in order, the deaf ones too."""
+"""Child processes end in order, the deaf ones too; what nobody waits for gives way."""
 
 import signal
 import subprocess
@@ -24,3 +24,21 @@ def test_children_are_told_to_end_and_the_deaf_one_is_killed() -> None:
     end([polite, deaf, over], 0.5)
     codes = [child.returncode for child in (polite, deaf, over)]
     assert codes == [-signal.SIGTERM, -signal.SIGKILL, 0]
+
+
+def test_what_gives_way_does_so_in_the_threads_that_it_begins_too() -> None:
+    program = """
+import os, threading
+from shared.runtime.process import give_way
+def say(): print(os.sched_getscheduler(0) == os.SCHED_BATCH)
+say()
+give_way()
+begun = threading.Thread(target=say)
+begun.start()
+begun.join()
+say()
+"""
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert run.stdout.split() == ["False", "True", "True"]
