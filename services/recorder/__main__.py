@@ -56,7 +56,11 @@ def site_hash(args: ServeArgs) -> str:
 
 
 def open_bus(args: ServeArgs, clock: Clock) -> Bus:
-    """Return a session in which streams may wait for longer than in others."""
+    """Return a session in which streams may wait for longer than in others.
+
+    Its threads wake behind those of the control path: nobody waits for a recorder.
+    """
+    give_way()
     if args.section("bus", BusConfig).inbox_messages < INBOX_MESSAGES:
         roomy = (*args.overrides, f"bus.inbox_messages={INBOX_MESSAGES}")
         args = dataclasses.replace(args, overrides=roomy)
@@ -75,7 +79,6 @@ def run(service: Recorder, bus: Bus, clock: Clock, args: ServeArgs, stop: thread
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the recorder; return its exit code."""
-    give_way()
     return serve("recorder", build, argv, open_bus=open_bus, loop=run)
 
 
