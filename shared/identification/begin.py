@@ -6,8 +6,9 @@ import numpy as np
 
 from shared.identification.base import INERTIA_PRIOR, base_parameters
 from shared.identification.dataset.types import Dataset
-from shared.identification.effect import Effect
+from shared.identification.effect import Candidate, Effect
 from shared.identification.fit import (
+    BaseFits,
     Fit,
     SavedFits,
     fit_again,
@@ -75,21 +76,47 @@ def begin(
         problem = Problem(subject, dataset, kept, noise)
         space = Space(problem)
         done = fit_without(space, done, doubted)
-    test = problem.of("test")
-    nominal = stretches(problem, space.variant(np.zeros(space.size)), test)
-    losses = stretches(problem, space.variant(done.whole.z), test)
     candidates, ruled_out = candidates_of(catalogue, subject, without)
+    return begun_with(
+        done,
+        seed=seed,
+        candidates=candidates,
+        ruled_out=ruled_out,
+        doubted=tuple(each.name for each in released if each not in problem.parameters),
+    )
+
+
+def begun_with(
+    done: BaseFits,
+    *,
+    seed: int,
+    candidates: tuple[Candidate, ...],
+    ruled_out: dict[str, str],
+    doubted: tuple[str, ...],
+) -> Search:
+    """Return a search that has just begun, from fits of its base.
+
+    Args:
+        done: the fits.
+        seed: of everything random.
+        candidates: what is looked for.
+        ruled_out: effects that cannot be, and why.
+        doubted: parameters that were taken out of the base.
+    """
+    space = done.whole.space
+    problem, test = space.problem, space.problem.of("test")
+    losses = stretches(problem, space.variant(done.whole.z), test)
     return Search(
         problem=problem,
         rng=np.random.default_rng([seed, 1]),
         candidates=candidates,
         ruled_out=ruled_out,
-        doubted=tuple(each.name for each in released if each not in problem.parameters),
+        doubted=doubted,
         base=done.whole,
         nominal=done.nominal,
         parts=done.parts,
         current=done.whole,
-        nominal_losses=nominal,
+        nominal_losses=stretches(problem, space.variant(np.zeros(space.size)), test),
         base_losses=losses,
         current_losses=losses,
     )

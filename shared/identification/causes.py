@@ -51,7 +51,7 @@ def _cause(found: Search, tried: Tried, values: Float64, widths: Float64, base: 
     )
 
 
-def _rival(found: Search, tried: Tried, base: float) -> Cause:
+def rival(found: Search, tried: Tried, base: float) -> Cause:
     """Return a cause that was not taken, with its sizes in its own fit."""
     widths = half_widths(tried.fit, found.problem.of("train"))
     values = tried.fit.space.values(tried.fit.z)[-1]
@@ -65,10 +65,10 @@ def ties_of(found: Search, causes: tuple[Cause, ...]) -> tuple[Tie, ...]:
     for cause, tried, rivals in zip(causes, found.accepted, found.rivals, strict=True):
         if not rivals:
             continue
-        others = tuple(_rival(found, each, base) for each in rivals)
+        others = tuple(rival(found, each, base) for each in rivals)
         alike = min(_cosine(tried, each) for each in rivals)
         names = [label(cause), *map(label, others)]
-        out.append(Tie(causes=(cause, *others), alike=alike, record=_motion(tried, rivals, names)))
+        out.append(Tie(causes=(cause, *others), alike=alike, record=motion(tried, rivals, names)))
     return tuple(out)
 
 
@@ -79,7 +79,7 @@ def _cosine(one: Tried, other: Tried) -> float:
     return abs(float(first @ second))
 
 
-def _motion(tried: Tried, rivals: tuple[Tried, ...], names: list[str]) -> str:
+def motion(tried: Tried, rivals: tuple[Tried, ...], names: list[str]) -> str:
     """Return what to record to tell causes apart, by what sets them apart."""
     sides = {each.candidate.effect.side for each in (tried, *rivals)}
     places = {each.candidate.place for each in (tried, *rivals)}

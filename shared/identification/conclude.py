@@ -4,12 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shared.identification.bent import ties_with_base
 from shared.identification.causes import causes_of, ties_of
 from shared.identification.certainty import half_widths
 from shared.identification.dataset.types import Float64
 from shared.identification.gate import compare, floor_of
 from shared.identification.problem import Variant
-from shared.identification.searched import ALIKE, Search, Tried
+from shared.identification.searched import ALIKE, Search, Tried, is_open
 from shared.identification.sentence import sentence_of
 from shared.identification.verdict import (
     BaseValue,
@@ -22,15 +23,8 @@ from shared.identification.verdict import (
     Word,
 )
 
-NEARLY_NOISE = 1.4
-"""Mean square residual below which nothing worth a name is left."""
 STANDS_OUT = 5.0
 """Size of a stretch, in noise floors, that is not passed over whatever the mean residual is."""
-BESIDE_A_NAME = 1.7
-"""The same beside a cause that passed."""
-MAY_BE_LEFT = 0.08
-"""Share of the base fit's mean square residual that named causes may leave where that is more:
-what is far larger than the noise is never modelled to the last digit."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +50,7 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
     held_out = _held_out(found)
     widths = half_widths(found.current, found.problem.of("train"))
     accepted = causes_of(found, widths)
-    ties = ties_of(found, accepted)
+    ties = ties_of(found, accepted) or ties_with_base(found)
     word = _word(found, ties, left)
     sure = tuple(cause for cause, rivals in zip(accepted, found.rivals, strict=True) if not rivals)
     told = accepted if word == "unexplained" else sure
@@ -76,21 +70,13 @@ def extended(found: Search) -> Variant:
     return found.current.space.variant(found.current.z)
 
 
-def is_open(found: Search) -> bool:
-    """Return whether more is left than a verdict that names causes, or none, may leave."""
-    base, left = float(found.base_losses.mean()), float(found.current_losses.mean())
-    if found.accepted:
-        return left > max(BESIDE_A_NAME, MAY_BE_LEFT * base)
-    return base > NEARLY_NOISE
-
-
 def _word(found: Search, ties: tuple[Tie, ...], left: tuple[Unexplained, ...]) -> Word:
     if found.accepted:
         if is_open(found):
             return "unexplained"
         return "tie" if ties else "named"
     if not is_open(found) and not _stands_out(left):
-        return "none"
+        return "tie" if ties else "none"
     return "base_too_coarse" if found.doubted else "unexplained"
 
 

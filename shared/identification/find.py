@@ -9,8 +9,9 @@ import numpy as np
 
 from shared.identification.again import fresh, leave_out
 from shared.identification.begin import begin
+from shared.identification.bent import otherwise
 from shared.identification.catalogue import effects
-from shared.identification.conclude import Conclusion, conclude, extended, is_open
+from shared.identification.conclude import Conclusion, conclude, extended
 from shared.identification.dataset.types import Dataset
 from shared.identification.effect import Effect
 from shared.identification.evidence import Evidence
@@ -20,7 +21,7 @@ from shared.identification.problem import BLOCK, Variant
 from shared.identification.progress import Progress, silent
 from shared.identification.saved import load, save
 from shared.identification.search import search
-from shared.identification.searched import Search
+from shared.identification.searched import Search, is_open
 from shared.identification.verdict import Unexplained, Verdict
 from shared.runtime.build import commit
 from shared.runtime.service import version
@@ -82,6 +83,9 @@ def identify(
         clock.over("search")
         left = _left(found)
         clock.over("unexplained")
+    if not found.accepted and not is_open(found):
+        found.otherwise = otherwise(found, progress)
+        clock.over("search")
     progress("diagnostics", 0.0)
     evidence = _evidence(found)
     conclusion = conclude(found, left)

@@ -231,11 +231,22 @@ def fit_without(space: Space, done: BaseFits, doubted: Sequence[int]) -> BaseFit
         doubted: which of its coordinates they were.
     """
     begun, best = (np.delete(fit.z, doubted) for fit in (done.parts, done.whole))
-    segments = space.problem.of("train")
+    return fit_from(space, begun, best, starts_agree=done.whole.starts_agree)
+
+
+def fit_from(space: Space, begun: Float64, best: Float64, *, starts_agree: bool) -> BaseFits:
+    """Return the base's fit from where one like it came to.
+
+    Args:
+        space: where.
+        begun: float64[n], the other's best on short parts.
+        best: float64[n], on whole recordings.
+        starts_agree: whether its starts did.
+    """
     nominal, parts = _on_parts(space, begun)
     is_same = parts.space.problem is space.problem
-    whole = parts if is_same else polish(space, best, segments, 6)
-    return BaseFits(nominal, parts, replace(whole, starts_agree=done.whole.starts_agree))
+    whole = parts if is_same else polish(space, best, space.problem.of("train"), 6)
+    return BaseFits(nominal, parts, replace(whole, starts_agree=starts_agree))
 
 
 def _fitted(space: Space, searched: Float64) -> BaseFits:

@@ -15,6 +15,13 @@ from shared.identification.screen import Screened
 
 ALIKE = 0.02
 """Of a cause's gain: what does as well within this is not told from it."""
+NEARLY_NOISE = 1.4
+"""Mean square residual below which nothing worth a name is left."""
+BESIDE_A_NAME = 1.7
+"""The same beside a cause that passed."""
+MAY_BE_LEFT = 0.08
+"""Share of the base fit's mean square residual that named causes may leave where that is more:
+what is far larger than the noise is never modelled to the last digit."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +47,18 @@ class Tried:
     def numbers(self) -> int:
         """Return how many numbers the effect has."""
         return len(self.screened.start)
+
+
+@dataclass(frozen=True)
+class Otherwise:
+    """Causes that do as well as the base alone, beside a base near the model file (``bent.py``)."""
+
+    base: Fit
+    """Far from the model file, though what is known of that counts."""
+    tried: tuple[Tried, ...]
+    """Best first."""
+    alike: float
+    """Smallest cosine between what the base explains by going far, and what they explain."""
 
 
 @dataclass
@@ -69,6 +88,16 @@ class Search:
     accepted: list[Tried] = field(default_factory=list[Tried])
     rivals: list[tuple[Tried, ...]] = field(default_factory=list[tuple[Tried, ...]])
     """For each accepted cause, what the data do not tell from it."""
+    otherwise: Otherwise | None = None
+    """Where nothing was accepted, what does as well as the base alone."""
+
+
+def is_open(found: Search) -> bool:
+    """Return whether more is left than a verdict that names causes, or none, may leave."""
+    base, left = float(found.base_losses.mean()), float(found.current_losses.mean())
+    if found.accepted:
+        return left > max(BESIDE_A_NAME, MAY_BE_LEFT * base)
+    return base > NEARLY_NOISE
 
 
 class Model(NamedTuple):

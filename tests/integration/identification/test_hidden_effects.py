@@ -34,6 +34,7 @@ HIDDEN = (
     ("encoder_scale@shoulder=0.02", 9011),
     ("gravity_tilt=0.06", 9012),
 )
+ONE_POSTURE = ("torque_bias@shoulder=5", 9201)
 Look = Callable[[str, int], tuple[Truth, Verdict]]
 
 
@@ -43,6 +44,7 @@ def looked_at(wish: str, seed: int) -> tuple[Truth, Verdict]:
     recipe = Recipe(
         arm="arm3", seconds=3.0, train=2, test=2, seed=seed, wishes=wishes,
         is_imperfect=not wish and seed % 2 == 0,
+        reach=0.08 if (wish, seed) == ONE_POSTURE else 1.0,
     )  # fmt: skip
     dataset, truth = simulated(recipe)
     return truth, identify(dataset).verdict
@@ -83,3 +85,24 @@ def test_where_nothing_is_hidden_nothing_is_named(look: Look, wish: str, seed: i
     assert not verdict.causes, verdict.sentence
     allowed = ("none", "unexplained", "base_too_coarse") if seed % 2 == 0 else ("none",)
     assert verdict.verdict in allowed, verdict.sentence
+
+
+@pytest.mark.parametrize(("wish", "seed"), [ONE_POSTURE])
+def test_what_a_base_far_from_the_model_explains_is_told_from_nothing(
+    look: Look, wish: str, seed: int
+) -> None:
+    """Near one posture: a weak servo, a torque, and a counterbalance out of adjustment."""
+    truth, verdict = look(wish, seed)
+    assert verdict.verdict == "tie", verdict.sentence
+    (tie,) = verdict.ties
+    first, *others = tie.causes
+    assert (first.effect, first.where) == ("base model", "shoulder")
+    assert first.interval.low > 1.65
+    assert "kp shoulder" in first.others
+    assert {(each.effect, each.where) for each in others} == {
+        ("torque_bias", "shoulder"), ("counterbalance", "shoulder"),
+    }  # fmt: skip
+    torque = next(each for each in others if each.effect == "torque_bias")
+    assert torque.value == pytest.approx(truth.effect[0].quantities[0].value, rel=0.3)
+    assert tie.alike > 0.99
+    assert not verdict.causes

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from shared.identification.conclude import conclude
+from shared.identification.searched import Otherwise
 from shared.identification.verdict import Unexplained
 from tests.searches import DRAG, ELBOW, LIFT, Searches
 
@@ -41,6 +42,27 @@ def test_a_cause_that_leaves_little_more_than_noise_is_named(searches: Searches)
 def test_a_base_at_the_noise_has_nothing_to_name(searches: Searches):
     found = conclude(searches.search(_GOOD), ())
     assert (found.word, found.causes, found.ties) == ("none", (), ())
+    assert found.held_out.share_removed == 0.0
+
+
+def test_a_base_that_went_far_is_a_tie_with_what_does_as_well(searches: Searches):
+    tried = searches.tried(ELBOW, _GOOD, _GOOD)
+    parameters = searches.problem.parameters
+    index = next(i for i, each in enumerate(parameters) if each.name.startswith("kp"))
+    z = searches.base.z.copy()
+    z[index] = np.log(3.0)
+    bent = dataclasses.replace(searches.base, z=z)
+    search = searches.search(_GOOD)
+    search.otherwise = Otherwise(bent, (tried,), 0.99)
+    found = conclude(search, ())
+    assert (found.word, found.causes) == ("tie", ())
+    (tie,) = found.ties
+    base, cause = tie.causes
+    assert (base.effect, base.quantity) == ("base model", "kp factor")
+    assert base.where == parameters[index].name.removeprefix("kp ")
+    assert base.value == pytest.approx(3.0)
+    assert (cause.effect, cause.where) == ("torque_bias", "elbow")
+    assert "do not tell apart: base model of" in found.sentence
     assert found.held_out.share_removed == 0.0
 
 

@@ -1,0 +1,220 @@
+"""Asks what else the recordings could show where the base alone explains them by going far.
+
+Near one posture a weak servo sags as under a constant torque, so a base whose gains may be anything
+explains a torque that nobody then looks for. Between the two lies a valley: at its one end the base
+is far from the model file, at the other a cause is large. Where the base went far, each candidate
+gets the chance to bring it back, by what is usually known of a model file; one that does, and
+explains as much, is no less likely than a base so far off.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shared.identification.base import INERTIA_PRIOR, BaseParameter, base_parameters
+from shared.identification.causes import motion, rival
+from shared.identification.certainty import CALIBRATED, half_widths
+from shared.identification.dataset.types import Float64
+from shared.identification.effect import ONCE
+from shared.identification.fit import WINDOW, Fit, polish
+from shared.identification.gate import compare, stretches
+from shared.identification.problem import Problem
+from shared.identification.progress import Progress
+from shared.identification.screen import Screened, screen
+from shared.identification.searched import Otherwise, Search, Tried
+from shared.identification.sentence import label
+from shared.identification.space import Space
+from shared.identification.verdict import Cause, Interval, Tie
+
+FAR = 0.5
+"""Of the logarithm of a gain, damping or armature, a factor of 1.65 either way; of the friction
+that a model file gives, as a share of it."""
+NEARBY = 0.2
+"""Standard deviation of the same, in a model file that is about right."""
+_TRIED = 4
+"""Candidates that get the chance."""
+_MOST = 0.8
+"""Of what the best of them explains: what explains less gets none."""
+_STEPS, _ENOUGH = 12, 1e-4
+"""Of a fit: what pulls a base back is a small part of the cost."""
+_SLIGHT = 15.0
+"""What a cause must take off what speaks against the base, a sum of squares of standard deviations
+halved: one number that is 5.5 of them off."""
+
+
+def otherwise(found: Search, progress: Progress) -> Otherwise | None:
+    """Return the causes that explain as much as a base that went far, if there are any.
+
+    None of them is named, not even one that does a little better: a base that went far is at its
+    end by itself, and what is left of it says little.
+
+    Args:
+        found: a search in which the base alone explains the recordings.
+        progress: is told how far it is.
+    """
+    if not _far(found.base):
+        return None
+    progress("base fit", 0.0, "again, near the model file")
+    problem = replace(found.problem, parameters=_known(found.problem))
+    train, test = problem.of("train"), problem.of("test")
+    base = _along(Space(problem), _placed(found.base, problem))
+    if not _surely_far(base, half_widths(base, train)):
+        return None
+    near = base.z.copy()
+    near[list(_far(base))] = 0.0
+    tried: list[Tried] = []
+    instead = _instead(found, base.space, near)
+    for index, each in enumerate(instead):
+        progress("refit", index / len(instead), each.candidate.label)
+        space = base.space.grown(each.candidate)
+        fit = _along(space, np.r_[near, each.start])
+        losses = stretches(problem, space.variant(fit.z), test)
+        is_there = _is_there(fit, train)
+        if is_there and _brings_back(base, fit) and not _is_worse(losses, found.base_losses):
+            gain = compare(found.base_losses, losses, np.random.default_rng(0))
+            tried.append(Tried(each, fit, gain, losses))
+    if not tried:
+        return None
+    tried.sort(key=lambda each: each.gain.loss)
+    return Otherwise(base, tuple(tried), _alike(base, near, tried))
+
+
+def _along(space: Space, begun: Float64) -> Fit:
+    """Return a fit that goes along a valley to its end, where little speaks against the base."""
+    return polish(space, begun, space.problem.of("train"), _STEPS, _ENOUGH)
+
+
+def _instead(found: Search, space: Space, near: Float64) -> list[Screened]:
+    """Return the candidates that explain most of what a base near the model file leaves.
+
+    The base stays where it is: it could take over from any of them.
+    """
+    parts = Space(space.problem.in_parts(WINDOW))
+    pieces = parts.problem.of("train")
+    residual = parts.residual([near], pieces)[0]
+    jacobian = np.zeros((len(residual), space.size))
+    jacobian[-space.size :] = np.diag(1.0 / space.priors)
+    steady = [each for each in found.candidates if each.effect.name != ONCE]
+    screened = screen(Fit.of(parts, near, residual, jacobian), steady, pieces)
+    return [each for each in screened if each.share > _MOST * screened[0].share][:_TRIED]
+
+
+def _against(base: Fit, z: Float64) -> float:
+    """Return what speaks against a base, as part of the cost: half a sum of squares."""
+    return 0.5 * float(np.sum((z / base.space.priors) ** 2))
+
+
+def _brings_back(base: Fit, fit: Fit) -> bool:
+    """Return whether less is far from the model file in a fit, and that says something."""
+    before, after = set(_far(base)), set(_far(fit))
+    gain = _against(base, base.z) - _against(base, fit.z[: base.z.size])
+    return after < before and gain > _SLIGHT
+
+
+def _is_there(fit: Fit, segments: tuple[int, ...]) -> bool:
+    """Return whether some number of the cause is surely not 0."""
+    first = fit.space.base_size
+    widths = CALIBRATED * half_widths(fit, segments)[first:]
+    return bool(np.any(np.abs(fit.z[first:]) > widths))
+
+
+def _is_worse(losses: Float64, than: Float64) -> bool:
+    """Return whether the held-out recordings prefer the other one by more than chance would."""
+    margin = compare(losses, than, np.random.default_rng(0))
+    return margin.gain > margin.error
+
+
+def _alike(base: Fit, near: Float64, tried: Sequence[Tried]) -> float:
+    """Return the smallest cosine between what a base explains by going far, and what causes do."""
+    count = len(base.residual) - base.space.size
+    left = base.space.residual([near], base.space.problem.of("train"))[0][:count]
+    one = left - base.residual[:count]
+    others = [left - each.fit.residual[:count] for each in tried]
+    return min(
+        float(one @ other / max(np.linalg.norm(one) * np.linalg.norm(other), 1e-12))
+        for other in others
+    )
+
+
+def ties_with_base(found: Search) -> tuple[Tie, ...]:
+    """Return what the recordings of a search that is over do not tell from a base that went far."""
+    if (other := found.otherwise) is None:
+        return ()
+    loss = float(found.base_losses.mean())
+    causes = (_base_cause(other), *(rival(found, each, loss) for each in other.tried))
+    record = motion(other.tried[0], other.tried[1:], [label(each) for each in causes])
+    return (Tie(causes=causes, alike=other.alike, record=record),)
+
+
+def _far(fit: Fit) -> tuple[int, ...]:
+    """Return the coordinates of the base that are further from the model file than is likely."""
+    return tuple(
+        index
+        for index, (each, z) in enumerate(zip(fit.space.problem.parameters, fit.z, strict=False))
+        if each.nominal and each.prior != INERTIA_PRIOR and abs(z) > FAR * _unit(each)
+    )
+
+
+def _unit(each: BaseParameter) -> float:
+    """Return by how much a coordinate moves when its value does so by the nominal one."""
+    return 1.0 if each.is_factor else each.nominal / each.scale
+
+
+def _known(problem: Problem) -> tuple[BaseParameter, ...]:
+    """Return all of the base's parameters as what a model file that is about right says of them.
+
+    A friction of which it says nothing may be any; links are as well known as ever.
+    """
+    return tuple(
+        replace(each, prior=NEARBY * _unit(each))
+        if each.nominal and each.prior != INERTIA_PRIOR
+        else each
+        for each in base_parameters(problem.subject)
+    )
+
+
+def _placed(fit: Fit, problem: Problem) -> Float64:
+    """Return a base's coordinates in another problem of the same parameters, or more."""
+    names = [each.name for each in fit.space.problem.parameters]
+    known = dict(zip(names, fit.z, strict=True))
+    return np.array([known.get(each.name, 0.0) for each in problem.parameters], np.float64)
+
+
+def _surely_far(fit: Fit, widths: Float64) -> bool:
+    """Return whether something is far within its whole interval, float64[n] half of it."""
+    parameters = fit.space.problem.parameters
+    return any(
+        abs(fit.z[index]) - widths[index] > FAR * _unit(parameters[index]) for index in _far(fit)
+    )
+
+
+def _base_cause(other: Otherwise) -> Cause:
+    """Return what the base does instead of a cause: the parameter that is furthest off for it."""
+    base = other.base
+    parameters, z = base.space.problem.parameters, base.z
+    back = set(_far(base)) - set(_far(other.tried[0].fit))
+    first, *others = sorted(
+        back, key=lambda index: -abs(float(z[index])) / _unit(parameters[index])
+    )
+    each, half = parameters[first], half_widths(base, base.space.problem.of("train"))[first]
+    low, value, high = (_factor(each, float(z[first] + off)) for off in (-half, 0.0, half))
+    word, _, place = each.name.partition(" ")
+    return Cause(
+        effect="base model",
+        where=place,
+        quantity=f"{word} factor",
+        value=value,
+        unit="1",
+        interval=Interval(low=low, high=high),
+        title="gains, damping, armature or friction are far from the model file's",
+        signature="The base fit explains the motion by itself, with numbers far from the file's.",
+        others={
+            parameters[index].name: _factor(parameters[index], float(z[index])) for index in others
+        },
+    )
+
+
+def _factor(each: BaseParameter, z: float) -> float:
+    """Return a value over the nominal one."""
+    return each.value(z) / each.nominal
