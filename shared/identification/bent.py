@@ -26,6 +26,7 @@ from shared.identification.searched import Otherwise, Search, Tried
 from shared.identification.sentence import label
 from shared.identification.space import Space
 from shared.identification.verdict import Cause, Interval, Tie
+from shared.telemetry.wording import listing
 
 FAR = 0.5
 """Of the logarithm of a gain, damping or armature, a factor of 1.65 either way; of the friction
@@ -38,6 +39,8 @@ _MOST = 0.8
 """Of what the best of them explains: what explains less gets none."""
 _STEPS, _ENOUGH = 12, 1e-4
 """Of a fit: what pulls a base back is a small part of the cost."""
+_TOLD = 5
+"""Parameters that are told as far from the model file."""
 _SLIGHT = 15.0
 """What a cause must take off what speaks against the base, a sum of squares of standard deviations
 halved: one number that is 5.5 of them off."""
@@ -59,7 +62,7 @@ def otherwise(found: Search, progress: Progress) -> Otherwise | None:
     problem = replace(found.problem, parameters=_known(found.problem))
     train, test = problem.of("train"), problem.of("test")
     base = _along(Space(problem), _placed(found.base, problem))
-    if not _surely_far(base, half_widths(base, train)):
+    if not _surely_far(base):
         return None
     near = base.z.copy()
     near[list(_far(base))] = 0.0
@@ -181,12 +184,25 @@ def _placed(fit: Fit, problem: Problem) -> Float64:
     return np.array([known.get(each.name, 0.0) for each in problem.parameters], np.float64)
 
 
-def _surely_far(fit: Fit, widths: Float64) -> bool:
-    """Return whether something is far within its whole interval, float64[n] half of it."""
+def _surely_far(fit: Fit) -> list[int]:
+    """Return what is far within the whole 95 % interval of a fit to recordings, furthest first."""
     parameters = fit.space.problem.parameters
-    return any(
-        abs(fit.z[index]) - widths[index] > FAR * _unit(parameters[index]) for index in _far(fit)
-    )
+    widths = half_widths(fit, fit.space.problem.of("train"))
+    nearest = {
+        index: (abs(float(fit.z[index])) - float(widths[index])) / _unit(parameters[index])
+        for index in _far(fit)
+    }
+    return sorted((one for one in nearest if nearest[one] > FAR), key=lambda one: -nearest[one])
+
+
+def far_from_file(fit: Fit) -> str:
+    """Return in words what of a fit's base is surely far from the model file; empty if nothing."""
+    parameters = fit.space.problem.parameters
+    said = [
+        f"{parameters[index].name} {_factor(parameters[index], float(fit.z[index])):.2g} times"
+        for index in _surely_far(fit)[:_TOLD]
+    ]
+    return f"the base is far from the model file: {listing(said)} what it says" if said else ""
 
 
 def _base_cause(other: Otherwise) -> Cause:

@@ -9,7 +9,7 @@ import numpy as np
 
 from shared.identification.again import fresh, leave_out
 from shared.identification.begin import begin
-from shared.identification.bent import otherwise
+from shared.identification.bent import far_from_file, otherwise
 from shared.identification.catalogue import effects
 from shared.identification.conclude import Conclusion, conclude, extended
 from shared.identification.dataset.types import Dataset
@@ -126,6 +126,7 @@ def _verdict(
         base=conclusion.base,
         caveats=(
             *_uncounted(found),
+            *filter(None, [far_from_file(found.current)]),
             *(f"{each.trajectory}: {each.text}".lstrip(": ") for each in dataset.caveats),
         ),
         record_next=_record_next(conclusion, dataset),

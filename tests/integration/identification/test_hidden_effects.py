@@ -106,3 +106,4 @@ def test_what_a_base_far_from_the_model_explains_is_told_from_nothing(
     assert torque.value == pytest.approx(truth.effect[0].quantities[0].value, rel=0.3)
     assert tie.alike > 0.99
     assert not verdict.causes
+    assert any("far from the model file" in each for each in verdict.caveats)
