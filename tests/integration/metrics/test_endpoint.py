@@ -106,7 +106,9 @@ def test_prometheus_reads_every_metric_of_a_run_and_floods_change_nothing(
             answer = client.recv(200) if words.endswith(b"\r\n\r\n") else b"HTTP/1.1 400"
         assert answer.startswith((b"HTTP/1.1 405", b"HTTP/1.1 400"))
     idle = [socket.create_connection(("127.0.0.1", site.port), timeout=20) for _ in range(40)]
-    assert served(site) is False, "all its places are taken"
+    taken_until = time.monotonic() + 5.0  # DEADLINE of the web would make room
+    while served(site):  # the kernel may hand it over before those that were there first
+        assert time.monotonic() < taken_until, "all its places are taken"
     for client in idle:
         client.close()
     while not served(site):
