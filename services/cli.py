@@ -105,6 +105,9 @@ def _main(words: list[str]) -> int:
 
 
 def _run(command: Command, argv: Sequence[str]) -> int:
+    from shared.runtime.process import limit_threads
+
+    limit_threads()  # before the command is imported, and numpy with it
     try:
         if command in JOBS:
             from shared.runtime.logging import configure_logging

@@ -23,7 +23,6 @@ from services.jobs.doctor.machine import processor
 from shared.config.site import nearest
 from shared.errors import ConfigError, RiposteError
 from shared.runtime.build import SOURCE_ROOT, commit
-from shared.runtime.process import THREAD_LIMITS
 
 QUIET_LOAD = 0.5
 """Load average per core above which a row says that the machine was busy."""
@@ -181,7 +180,6 @@ def run(name: str, *, smoke: bool) -> dict[str, Any]:
         name: of the script.
         smoke: only see that it works.
     """
-    os.environ.update(THREAD_LIMITS)  # before a library that reads it is loaded
     sys.path.insert(0, str(SOURCE_ROOT))
 
     def measure() -> Measurement:

@@ -23,6 +23,15 @@ THREAD_LIMITS = {
 spinning thread pools on two cores are slower than one thread."""
 
 
+def limit_threads() -> None:
+    """Compute on one thread in this process and its children, unless its user chose otherwise.
+
+    Before numpy or torch is imported: their thread pools begin then, and spin beside the work.
+    """
+    for name, threads in THREAD_LIMITS.items():
+        os.environ.setdefault(name, threads)
+
+
 @dataclasses.dataclass(frozen=True)
 class Usage:
     """What a process has used."""

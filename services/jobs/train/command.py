@@ -34,7 +34,6 @@ from shared.clock import Clock, SystemClock
 from shared.messages.training import AGENTS
 from shared.runtime.files import RunLock, atomic_write, require_free_space
 from shared.runtime.logging import configure_logging
-from shared.runtime.process import THREAD_LIMITS
 from shared.runtime.serve import stop_on_signals
 
 if TYPE_CHECKING:
@@ -175,7 +174,6 @@ def _train_serially(
     settings: Settings, folder: Path, run: str, resume: bool, stop: threading.Event
 ) -> None:
     """Run everything in this process until the schedule is done."""
-    os.environ.update(THREAD_LIMITS)
     from services.jobs.train.serial import SerialRun
 
     with contextlib.closing(

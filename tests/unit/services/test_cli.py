@@ -1,3 +1,4 @@
+import os
 import subprocess
 import sys
 import types
@@ -7,6 +8,7 @@ import pytest
 
 from services import cli
 from shared.errors import ConfigError
+from shared.runtime.process import THREAD_LIMITS
 
 
 @pytest.fixture
@@ -38,6 +40,29 @@ def test_help_lists_every_command_and_loads_none():
     )
     assert done.returncode == 0, done.stderr
     assert all(f"  {name} " in done.stdout for name in cli.COMMANDS)
+
+
+@pytest.mark.parametrize(("chosen", "threads"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "2"}, "2")])
+def test_a_command_computes_on_one_thread_unless_told_otherwise(chosen, threads: str):
+    code = (
+        "import os, sys, types; from services import cli\n"
+        "def main(argv):\n"
+        "    print('numpy' in sys.modules, os.environ['OPENBLAS_NUM_THREADS'])\n"
+        "    import numpy; a = numpy.ones((500, 500), numpy.float32); a @ a\n"
+        "    print(len(os.listdir('/proc/self/task')))\n"
+        "sys.modules['services.tried'] = tried = types.ModuleType('tried'); tried.main = main\n"
+        "cli.COMMANDS['try'] = cli.Command('try', 'tried', 'a test'); cli.main(['try'])"
+    )
+    unset = {name: value for name, value in os.environ.items() if name not in THREAD_LIMITS}
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", code],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        env=unset | chosen,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["False", threads, str(min(int(threads), os.cpu_count() or 1))]
 
 
 def test_an_unknown_command_is_answered_with_the_nearest_one(capsys):
