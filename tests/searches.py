@@ -13,7 +13,7 @@ from shared.identification.gate import compare
 from shared.identification.screen import Screened
 from shared.identification.searched import Search, Tried
 from shared.identification.space import Space
-from tests.measured import measure, problem_of
+from tests.measured import Enter, measure, nothing, problem_of
 
 ELBOW, LIFT = Candidate(BIAS, "elbow"), Candidate(BIAS, "lift")
 DRAG, OFFSET = Candidate(VISCOUS, "elbow"), Candidate(BIAS, "pan")
@@ -22,8 +22,9 @@ DRAG, OFFSET = Candidate(VISCOUS, "elbow"), Candidate(BIAS, "pan")
 class Searches:
     """Makes searches of one small data set; only the losses are made up."""
 
-    def __init__(self, folder: Path, seconds: float = 2.0) -> None:
-        self.problem = problem_of(measure(folder, np.random.default_rng(0), seconds=seconds))
+    def __init__(self, folder: Path, seconds: float = 2.0, enter: Enter = nothing) -> None:
+        rng = np.random.default_rng(0)
+        self.problem = problem_of(measure(folder, rng, enter, seconds=seconds))
         self.base = self.fit(())
         self._fits: dict[tuple[Candidate, ...], Fit] = {}
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from shared.identification.base import INERTIA_PRIOR, BaseParameter, base_parameters
 from shared.identification.causes import motion, rival
-from shared.identification.certainty import CALIBRATED, half_widths
+from shared.identification.certainty import half_widths, is_there
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import ONCE
 from shared.identification.fit import WINDOW, Fit, polish
@@ -73,8 +73,8 @@ def otherwise(found: Search, progress: Progress) -> Otherwise | None:
         space = base.space.grown(each.candidate)
         fit = _along(space, np.r_[near, each.start])
         losses = stretches(problem, space.variant(fit.z), test)
-        is_there = _is_there(fit, train)
-        if is_there and _brings_back(base, fit) and not _is_worse(losses, found.base_losses):
+        is_sure = is_there(fit, each.candidate, train)
+        if is_sure and _brings_back(base, fit) and not _is_worse(losses, found.base_losses):
             gain = compare(found.base_losses, losses, np.random.default_rng(0))
             tried.append(Tried(each, fit, gain, losses))
     if not tried:
@@ -113,13 +113,6 @@ def _brings_back(base: Fit, fit: Fit) -> bool:
     before, after = set(_far(base)), set(_far(fit))
     gain = _against(base, base.z) - _against(base, fit.z[: base.z.size])
     return after < before and gain > _SLIGHT
-
-
-def _is_there(fit: Fit, segments: tuple[int, ...]) -> bool:
-    """Return whether some number of the cause is surely not 0."""
-    first = fit.space.base_size
-    widths = CALIBRATED * half_widths(fit, segments)[first:]
-    return bool(np.any(np.abs(fit.z[first:]) > widths))
 
 
 def _is_worse(losses: Float64, than: Float64) -> bool:

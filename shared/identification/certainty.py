@@ -4,6 +4,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from shared.identification.dataset.types import Float64
+from shared.identification.effect import Candidate
 from shared.identification.fit import Fit
 from shared.identification.gate import STRETCH
 from shared.identification.problem import BLOCK
@@ -43,6 +44,19 @@ def half_widths(fit: Fit, segments: tuple[int, ...]) -> Float64:
     covariance = bread @ (spread.T @ spread) @ bread * max(n - 1, 1) / n
     factor = float(stdtrit(max(n - 1, 1), 0.975))
     return factor * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+
+def is_there(fit: Fit, candidate: Candidate, segments: tuple[int, ...]) -> bool:
+    """Return whether some number of a cause in a fit is surely not 0, where it is nothing.
+
+    Args:
+        fit: on the recordings ``segments``.
+        candidate: one of those in it.
+        segments: in the order in which the fit had them.
+    """
+    own = fit.space.where(candidate)
+    widths = CALIBRATED * half_widths(fit, segments)[own]
+    return bool(np.any(np.abs(fit.z[own]) > widths))
 
 
 def _score(jacobian: Float64, residual: Float64, bread: Float64) -> Float64:

@@ -75,9 +75,11 @@ def _word(found: Search, ties: tuple[Tie, ...], left: tuple[Unexplained, ...]) -
         if is_open(found):
             return "unexplained"
         return "tie" if ties else "named"
-    if not is_open(found) and not _stands_out(left):
-        return "tie" if ties else "none"
-    return "base_too_coarse" if found.doubted else "unexplained"
+    if is_open(found):
+        return "base_too_coarse" if found.doubted else "unexplained"
+    if _stands_out(left):
+        return "unexplained"
+    return "tie" if ties else "none"
 
 
 def _stands_out(left: tuple[Unexplained, ...]) -> bool:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from shared.identification.certainty import is_there
 from shared.identification.effect import Candidate
 from shared.identification.fit import Fit, polish
 from shared.identification.gate import compare, stretches
@@ -12,21 +13,42 @@ from shared.identification.space import Space
 
 
 def prune(found: Search, train: tuple[int, ...], test: tuple[int, ...]) -> None:
-    """Take back causes without which the rest does as well."""
+    """Take back causes that may as well be nothing, and those without which the rest does as well.
+
+    How much of a cause there is, the recordings that were fitted to say; held-out ones say of what
+    use it is. Where others can make up for it, any size is of use.
+    """
     base = float(found.base_losses.mean())
-    doubtful = [one for one in found.accepted[:-1] if not one.is_event and not one.is_relative]
-    for each in doubtful:
-        kept = [other for other in found.accepted if other is not each]
-        space = Space(found.problem, tuple(other.candidate for other in kept))
-        full = found.current.space
-        z = np.delete(found.current.z, full.where(each.candidate))
-        fit = polish(space, z, train, 2)
-        losses = stretches(found.problem, space.variant(fit.z), test)
-        without = Model(fit, losses)
+    for each in _doubtful(found.accepted)[::-1]:
+        is_told = not found.rivals[found.accepted.index(each)]
+        if is_told and not is_there(found.current, each.candidate, train):
+            _take_back(found, each, _without(found, each, train, test))
+    for each in _doubtful(found.accepted[:-1]):
+        without = _without(found, each, train, test)
         if not judged(found, each.candidate, without, so_far(found)).is_useful(base):
-            index = found.accepted.index(each)
-            del found.accepted[index], found.rivals[index]
-            found.current, found.current_losses = fit, losses
+            _take_back(found, each, without)
+
+
+def _doubtful(accepted: list[Tried]) -> list[Tried]:
+    """Return what was accepted for itself, and not as something that happened once."""
+    return [one for one in accepted if not one.is_event and not one.is_relative]
+
+
+def _without(found: Search, each: Tried, train: tuple[int, ...], test: tuple[int, ...]) -> Model:
+    """Return everything that was accepted but one."""
+    kept = tuple(other.candidate for other in found.accepted if other is not each)
+    space = Space(found.problem, kept)
+    z = np.delete(found.current.z, found.current.space.where(each.candidate))
+    fit = polish(space, z, train, 2)
+    return Model(fit, stretches(found.problem, space.variant(fit.z), test))
+
+
+def _take_back(found: Search, each: Tried, without: Model) -> None:
+    index = found.accepted.index(each)
+    del found.accepted[index], found.rivals[index]
+    found.current, found.current_losses = without
+    if not found.accepted:
+        found.current, found.current_losses = found.base, found.base_losses
 
 
 def one_for_many(found: Search, train: tuple[int, ...], test: tuple[int, ...]) -> None:
@@ -49,7 +71,8 @@ def one_for_many(found: Search, train: tuple[int, ...], test: tuple[int, ...]) -
             losses = stretches(found.problem, fit.space.variant(fit.z), test)
             margin = compare(losses, found.current_losses, found.rng)
             whole = compare(found.base_losses, losses, found.rng)
-            if margin.gain < max(margin.error, ALIKE * whole.gain):
+            is_alike = margin.gain < max(margin.error, ALIKE * whole.gain)
+            if is_alike and is_there(fit, other.candidate, train):
                 found.accepted = [*kept, replace(other, fit=fit, losses=losses)]
                 found.rivals = [() for _ in found.accepted]
                 found.current, found.current_losses = fit, losses

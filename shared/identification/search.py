@@ -40,7 +40,7 @@ def search(found: Search, progress: Progress) -> None:
         is_over = found.accepted and _is_over(found)
         if is_over or not _round(found, train, test, progress):
             break
-    if len(found.accepted) > 1:
+    if found.accepted:
         prune(found, train, test)
     if len(found.accepted) > 1:
         one_for_many(found, train, test)

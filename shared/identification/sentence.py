@@ -1,5 +1,6 @@
 """Says in a sentence or two what a search comes to."""
 
+from shared.identification.searched import NEARLY_NOISE
 from shared.identification.verdict import Cause, HeldOut, Tie, Unexplained, Word
 from shared.telemetry.wording import listing
 
@@ -40,6 +41,13 @@ def sentence_of(
         )
     if left and all(each.is_external for each in left):
         return f"Nothing to name but what came from outside.{_also_pushed(left)}"
+    if left and held_out.base_fit**2 <= NEARLY_NOISE:
+        first = left[0]
+        return (
+            f"With its base fitted the simulation is at {ratio}, but something stands out that no "
+            f"effect of the catalogue explains: at {first.where}, from {first.begin:.2f} to "
+            f"{first.end:.2f} s of {first.trajectory}, {first.times_noise:.2g} times the noise."
+        )
     place = f", most of it at {left[0].where} {left[0].phase}" if left else ""
     return f"Something is wrong that no effect of the catalogue explains: {ratio}{place}."
 

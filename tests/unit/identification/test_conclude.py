@@ -125,6 +125,13 @@ def test_much_that_no_effect_takes_off_is_unexplained(searches: Searches):
     assert scored.why_not == "no better on held-out recordings"
 
 
+def test_what_stands_out_of_a_base_that_fits_is_told_with_when_it_was(searches: Searches):
+    found = conclude(searches.search(_GOOD, doubted=("mass elbow",)), (_PUSH,))
+    assert (found.word, found.causes) == ("unexplained", ())
+    assert "is at 1.05 times the noise, but" in found.sentence
+    assert "at elbow, from 0.50 to 0.60 s of first, 9 times the noise" in found.sentence
+
+
 def test_a_cause_that_leaves_too_much_is_not_believed(searches: Searches):
     half = 0.5 * _BAD
     found = conclude(searches.search(_BAD, searches.tried(DRAG, _BAD, half)), ())

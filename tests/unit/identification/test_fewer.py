@@ -1,12 +1,22 @@
 """What is taken back of several causes."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from shared.identification.catalogue.joint_spring import EFFECT as JOINT_SPRING
+from shared.identification.certainty import half_widths
 from shared.identification.dataset.types import Float64
-from shared.identification.fewer import one_for_many
+from shared.identification.effect import Candidate
+from shared.identification.fewer import one_for_many, prune
+from shared.identification.fit import polish
 from shared.identification.searched import Search
-from tests.searches import DRAG, ELBOW, LIFT, Searches
+from shared.sim.plant.row import Row
+from tests.searches import ELBOW, LIFT, Searches
+
+SPRING = Candidate(JOINT_SPRING, "elbow")
 
 
 @pytest.fixture(scope="module")
@@ -15,17 +25,22 @@ def searches(tmp_path_factory: pytest.TempPathFactory) -> Searches:
 
 
 def two_torques(searches: Searches, base: Float64, left: Float64) -> Search:
-    """Return a search that took torques of two joints, and had tried a drag."""
+    """Return a search that took torques of two joints, and had tried a spring."""
     elbow, lift = (searches.tried(each, base, left) for each in (ELBOW, LIFT))
-    drag = searches.tried(DRAG, np.full(8, 10.0), np.linspace(1.0, 1.2, 8))
-    return searches.search(base, lift, before=(elbow,), tried=(drag,))
+    spring = searches.tried(SPRING, np.full(8, 10.0), np.linspace(1.0, 1.2, 8), numbers=2)
+    return searches.search(base, lift, before=(elbow,), tried=(spring,))
 
 
-def test_one_cause_that_does_as_well_is_taken_for_two_of_one_effect(searches: Searches):
-    found = two_torques(searches, np.linspace(8.0, 12.0, 4), np.linspace(0.95, 1.1, 4))
+def test_one_cause_that_does_as_well_is_taken_for_two_of_one_effect(tmp_path: Path):
+    def pull(row: Row) -> None:
+        SPRING.effect.enter(row, SPRING.place, np.array([1.0, 0.3]))
+
+    found = two_torques(
+        Searches(tmp_path, enter=pull), np.linspace(8.0, 12.0, 4), np.linspace(0.95, 1.1, 4)
+    )
     one_for_many(found, found.problem.of("train"), found.problem.of("test"))
-    assert [each.candidate for each in found.accepted] == [DRAG]
-    assert found.current.space.candidates == (DRAG,)
+    assert [each.candidate for each in found.accepted] == [SPRING]
+    assert found.current.space.candidates == (SPRING,)
     assert found.rivals == [()]
     assert found.current_losses.mean() < 1.3
 
@@ -34,3 +49,22 @@ def test_two_causes_of_one_effect_that_do_better_stay(searches: Searches):
     found = two_torques(searches, np.linspace(1.4, 1.6, 4), np.full(4, 0.01))
     one_for_many(found, found.problem.of("train"), found.problem.of("test"))
     assert [each.candidate for each in found.accepted] == [ELBOW, LIFT]
+
+
+@pytest.mark.parametrize("widths", [0.0, 10.0])
+def test_a_cause_that_may_as_well_be_nothing_is_taken_back(searches: Searches, widths: float):
+    """However much it takes off the held-out loss: nothing is hidden in these recordings."""
+    elbow = searches.tried(ELBOW, np.full(8, 10.0), np.linspace(1.0, 1.2, 8))
+    found = searches.search(np.full(8, 10.0), elbow)
+    train, test = found.problem.of("train"), found.problem.of("test")
+    fit = polish(elbow.fit.space, elbow.fit.z, train, 4)
+    z = fit.z.copy()
+    z[-1] += widths * half_widths(fit, train)[-1]
+    found.current = replace(fit, z=z)
+    prune(found, train, test)
+    if widths:
+        assert [each.candidate for each in found.accepted] == [ELBOW]
+    else:
+        assert not found.accepted
+        assert found.current is found.base
+        assert found.current_losses is found.base_losses

@@ -52,8 +52,9 @@ def test_beside_a_far_larger_cause_a_quarter_of_what_noise_does_not_account_for_
         return Gain(loss, before, 0.0, 0.0, 0.2, 0.1, is_measured)
 
     assert gain(2.2, 1.3, True).is_useful(105.0)
-    assert gain(2.2, 1.85, True).is_useful(105.0)
-    assert not gain(2.2, 1.95, True).is_useful(105.0)  # a larger one is never modelled exactly
+    assert gain(2.2, 1.85, True).is_useful(60.0)
+    assert not gain(2.2, 1.95, True).is_useful(60.0)  # a larger one is never modelled exactly
+    assert not gain(2.2, 1.85, True).is_useful(105.0)  # 0.3 % of what it took off
     assert not gain(2.2, 1.3, False).is_useful(105.0)  # who knows what of it is noise
 
 
