@@ -12,17 +12,21 @@ from shared.sim.plant.structure import Structure
 
 
 class _Law:
-    """Friction in proportion to the drive's torque."""
+    """Friction in proportion to what the gear transmits."""
 
     def __call__(self, step: Step, values: Float64) -> Float64:
-        return values * np.abs(step.drive)
+        return values * np.abs(step.load)
 
 
 _LAW = _Law()
 
 
 class LoadFriction:
-    """Coulomb friction in proportion to the torque that a gear transmits (BAM, model M3)."""
+    """Coulomb friction in proportion to the torque that a gear transmits.
+
+    BAM's model M3 takes the difference of motor and external torque: twice this, where rotor and
+    arm have the same inertia (Duclusaud et al., ICRA 2025).
+    """
 
     name = "load_friction"
     title = "friction grows with the load on the joint"

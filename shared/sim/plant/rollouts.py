@@ -138,6 +138,7 @@ class Rollouts:
         rows = [self._commanded(row) for row, _ in work]
         for index, row in enumerate(rows):
             row.index = index
+        self._rotors = np.stack([row.current("dof_armature")[self._dofs] for row in rows])
         if self.plant.control == "pose":
             for row in rows:
                 centre(row)
@@ -288,6 +289,7 @@ class Rollouts:
             control[ids] = ctrl[:, 0]
             batch.forward(ids)
             self._drive_before = np.array(drives)
+            self._speed_before = qvel[joints]
         for index in range(count):
             control[ids] = ctrl[:, index]
             applied[ids] = 0.0
@@ -296,6 +298,9 @@ class Rollouts:
             drive = np.array(drives)
             change = drive - self._drive_before
             self._drive_before[:] = drive
+            speed = qvel[joints]
+            turning = self._rotors * (speed - self._speed_before) / self.plant.timestep
+            self._speed_before = speed
             if beside is not None:
                 its = beside.rows
                 told = control[np.ix_(its, self._columns)]
@@ -312,6 +317,7 @@ class Rollouts:
                     drive=drive[pick],
                     drive_change=change[pick],
                     gravity=bias[pick],
+                    load=drive[pick] - turning[active.rows],
                 )
                 if isinstance(active, Rubbing):
                     rubs[pick] += active.law(step, active.values)

@@ -32,6 +32,9 @@ class Step:
     """float64[K, J], by how much that rose from the step before (N m, N)."""
     gravity: Float64
     """float64[K, J], gravity, centrifugal and Coriolis torque that the drive has to hold."""
+    load: Float64
+    """float64[K, J], what gears transmit: ``drive`` less what turned the rotors (armature) in the
+    last step (N m, N)."""
 
 
 class TorqueLaw(Protocol):

@@ -12,11 +12,15 @@ def _enter(robot: Robot, case: Case) -> None:
 def _rub(robot: Robot, case: Case) -> Law:
     bristles = Bristles()
     joint = case.scene.joints.index(case.place)
+    before = 0.0
 
     def act(moment: Moment) -> None:
+        nonlocal before
         dof = dof_of(robot, moment.model, case.place)
-        level = case.size * abs(float(moment.drive[joint]))
         speed = float(moment.data.qvel[dof])
+        rotor = float(moment.model.dof_armature[dof]) * (speed - before) / moment.timestep
+        before = speed
+        level = case.size * abs(float(moment.drive[joint]) - rotor)
         moment.data.qfrc_applied[dof] += bristles.torque(level, speed, moment.timestep)
 
     return act

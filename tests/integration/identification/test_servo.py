@@ -1,0 +1,96 @@
+"""A hobby servo with a weight on an arm, as BAM records them, by an integrator of its own.
+
+Its motor law and friction are BAM's (Duclusaud et al., ICRA 2025), its equations are not MuJoCo's:
+what the finder says of it does not come from a simulator that it shares with the data.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shared.identification.dataset.types import Dataset, Float64, ModelSource, Trajectory
+from shared.identification.find import identify
+
+MASS, LENGTH, ROTOR = 1.0, 0.15, 0.02
+"""Of the weight (kg), its distance (m), and the motor's inertia behind the gear (kg m^2)."""
+INERTIA = MASS * LENGTH**2
+TORQUE_PER_RAD = 9.6
+BACK_EMF = 1.28
+"""Torque that the turning motor takes from itself (N m s/rad)."""
+DAMPING = 0.05
+LAW = {"load": 0.12, "friction": 0.08, "excess": 0.1, "speed": 0.3}
+"""Of the torque through the gear; dry friction, what more it is at rest (N m), and until which
+speed (rad/s)."""
+STEP, PERIOD, SECONDS = 2e-4, 5e-3, 5.0
+MODEL = f"""<mujoco><compiler angle="radian"/><option timestep="0.001"/><worldbody><body>
+<joint name="servo" axis="0 1 0" armature="{0.5 * ROTOR}" damping="0.02" frictionloss="0.05"/>
+<inertial mass="{MASS}" pos="0 0 -{LENGTH}" diaginertia="1e-5 1e-5 1e-5"/></body></worldbody>
+<actuator><position name="servo" joint="servo" kp="{1.2 * TORQUE_PER_RAD}" kv="{0.8 * BACK_EMF}"/>
+</actuator></mujoco>"""
+"""What is known of it beforehand: gains 20 % off, half of the rotor, another friction."""
+MOTIONS: dict[str, Callable[[Float64], Float64]] = {
+    "faster": lambda at: 1.4 * np.sin(0.6 * at**2),
+    "waves": lambda at: 1.1 * np.sin(at) + 0.35 * np.sin(5.0 * at) * np.sin(2.0 * at),
+    "again": lambda at: MOTIONS["waves"](at),
+    "slow": lambda at: 0.4 * np.sin(0.5 * at) + 0.8 * np.sin(0.23 * at),
+    "away": lambda at: -1.1 * np.sin(0.5 * (at + 0.3) ** 2) + 1.1 * np.sin(0.045),
+}  # fmt: skip
+
+
+def servo(target: Float64) -> Float64:
+    """Return where the servo is at each instant of its commands, from rest at 0."""
+    q, speed, found = 0.0, 0.0, np.empty(len(target))
+    for row, wanted in enumerate(target):
+        found[row] = q
+        for _ in range(round(PERIOD / STEP)):
+            motor = TORQUE_PER_RAD * (wanted - q) - BACK_EMF * speed
+            weight = -MASS * 9.81 * LENGTH * np.sin(q)
+            through = (INERTIA * motor - ROTOR * weight) / (INERTIA + ROTOR)
+            rubs = LAW["load"] * abs(through) + LAW["friction"]
+            rubs += LAW["excess"] * np.exp(-((speed / LAW["speed"]) ** 2))
+            speed += (motor + weight - DAMPING * speed) * STEP / (INERTIA + ROTOR)
+            slower = abs(speed) - rubs * STEP / (INERTIA + ROTOR)
+            speed = np.copysign(max(slower, 0.0), speed)
+            q += speed * STEP
+    return found
+
+
+def recording(
+    name: str, motion: Callable[[Float64], Float64], rng: np.random.Generator
+) -> Trajectory:
+    """Return what a servo with an encoder of 4,096 steps a turn logs at 200 Hz."""
+    at: Float64 = np.arange(0.0, SECONDS, PERIOD)
+    target = motion(at)
+    count = 2.0 * np.pi / 4096
+    read = servo(target) + 3e-4 * rng.standard_normal(len(at))
+    return Trajectory(
+        name=name, split="test" if name in ("slow", "away") else "train",
+        repeats="waves" if name == "again" else "", initial_q=np.zeros(1), initial_qd=np.zeros(1),
+        command_at=at, command=target[:, None], joints_at=at,
+        q=count * np.round(read / count)[:, None],
+    )  # fmt: skip
+
+
+@pytest.mark.timeout(300)
+def test_a_servos_friction_is_told_by_its_laws(tmp_path: Path):
+    path = tmp_path / "servo.xml"
+    path.write_text(MODEL)
+    rng = np.random.default_rng(1)
+    dataset = Dataset(
+        folder=tmp_path,
+        source=ModelSource("mjcf", path),
+        control="position",
+        joints=("servo",),
+        actuators=("servo",),
+        trajectories=tuple(recording(name, motion, rng) for name, motion in MOTIONS.items()),
+        caveats=(),
+        hash="",
+    )
+    verdict = identify(dataset).verdict
+    assert verdict.verdict == "named"
+    assert {cause.effect: cause.value for cause in verdict.causes} == pytest.approx(
+        {"load_friction": LAW["load"], "stribeck_friction": LAW["excess"]}, rel=0.15
+    )
+    assert verdict.held_out.extended < 0.1 * verdict.held_out.base_fit
