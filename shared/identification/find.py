@@ -22,6 +22,7 @@ from shared.identification.progress import Progress, silent
 from shared.identification.saved import load, save
 from shared.identification.search import search
 from shared.identification.searched import Search, is_open
+from shared.identification.timestep import coarse_step
 from shared.identification.verdict import Unexplained, Verdict
 from shared.runtime.build import commit
 from shared.runtime.service import version
@@ -126,7 +127,7 @@ def _verdict(
         base=conclusion.base,
         caveats=(
             *_uncounted(found),
-            *filter(None, [far_from_file(found.current)]),
+            *filter(None, [far_from_file(found.current), _coarse_step(found)]),
             *(f"{each.trajectory}: {each.text}".lstrip(": ") for each in dataset.caveats),
         ),
         record_next=_record_next(conclusion, dataset),
@@ -139,6 +140,10 @@ def _verdict(
         cpu_s=sum(seconds.values()),
         seconds=seconds,
     )
+
+
+def _coarse_step(found: Search) -> str:
+    return coarse_step(found.base, found.problem.of("test"))
 
 
 def _uncounted(found: Search) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ Contacts are off: what touches an arm is looked for as an effect, not modelled.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -185,6 +185,17 @@ def mjcf(
         base_body=names.body(_root(compiled, int(last))),
         tool_body=tool,
     )
+
+
+def finer(plant: Plant, timestep: float) -> Plant:
+    """Return the same arm with another time step of its physics (s)."""
+
+    def make() -> mujoco.MjSpec:
+        spec = plant.make()
+        spec.option.timestep = timestep
+        return spec
+
+    return replace(plant, make=make, timestep=timestep)
 
 
 @dataclass(frozen=True)
