@@ -1,5 +1,7 @@
 """How sure a fitted number is, when noise is neither white nor all that is left."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.special import stdtrit
 
@@ -12,6 +14,8 @@ from shared.identification.problem import BLOCK
 CALIBRATED = 1.35
 """Times the half width of a cause's size, since no simulation is quite the arm: without it 57 of 67
 intervals covered on development data, with it 62 (docs/identify.md)."""
+_NOTHING = 0.01
+"""What no residual changes by, in noise floors."""
 _MOST_OWN = 0.9
 """Share of a stretch's own information that is taken out of the fit that judges it."""
 
@@ -47,7 +51,10 @@ def half_widths(fit: Fit, segments: tuple[int, ...]) -> Float64:
 
 
 def is_there(fit: Fit, candidate: Candidate, segments: tuple[int, ...]) -> bool:
-    """Return whether some number of a cause in a fit is surely not 0, where it is nothing.
+    """Return whether a cause in a fit is surely more than nothing.
+
+    Its first number is surely not 0, or others are that do something without it: two angles of a
+    tilt do, the speed over which a friction falls off does not.
 
     Args:
         fit: on the recordings ``segments``.
@@ -55,8 +62,15 @@ def is_there(fit: Fit, candidate: Candidate, segments: tuple[int, ...]) -> bool:
         segments: in the order in which the fit had them.
     """
     own = fit.space.where(candidate)
-    widths = CALIBRATED * half_widths(fit, segments)[own]
-    return bool(np.any(np.abs(fit.z[own]) > widths))
+    is_sure = np.abs(fit.z[own]) > CALIBRATED * half_widths(fit, segments)[own]
+    if is_sure[0] or not is_sure.any():
+        return bool(is_sure[0])
+    rest = fit.z.copy()
+    rest[own.start] = 0.0
+    others = fit.space.variant(rest)
+    extras = tuple(each for each in others.extras if each[0] != candidate)
+    left, none = fit.space.problem.vector([others, replace(others, extras=extras)], segments)
+    return bool(np.abs(left - none).max() > _NOTHING)
 
 
 def _score(jacobian: Float64, residual: Float64, bread: Float64) -> Float64:

@@ -1,13 +1,19 @@
 """Intervals of fitted numbers, where residuals correlate and stretches are few."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from shared.identification.certainty import half_widths
-from shared.identification.fit import Fit
+from shared.identification.catalogue.gravity_tilt import EFFECT as TILT
+from shared.identification.catalogue.stribeck_friction import EFFECT as STRIBECK
+from shared.identification.certainty import CALIBRATED, half_widths, is_there
+from shared.identification.effect import Candidate, Effect
+from shared.identification.fit import Fit, polish
+from shared.identification.space import Space
+from tests.measured import measure, problem_of
 
 
 @dataclass
@@ -43,3 +49,20 @@ def test_intervals_cover_though_residuals_correlate(stretches: int, numbers: int
                   np.concatenate([jacobian, padding]), 0.0)  # fmt: skip
         covered.append(np.mean(np.abs(z) <= half_widths(fit, (0,))))
     assert 0.91 <= np.mean(covered) <= 0.99
+
+
+@pytest.mark.parametrize(
+    ("effect", "place", "is_enough"), [(STRIBECK, "elbow", False), (TILT, "", True)]
+)
+def test_a_cause_is_there_if_what_is_sure_of_it_does_something(
+    tmp_path: Path, effect: Effect, place: str, is_enough: bool
+):
+    """Of friction that falls off with speed, a sure speed is nothing; of a tilt one angle is."""
+    space = Space(problem_of(measure(tmp_path, np.random.default_rng(0), seconds=2.0)))
+    candidate = Candidate(effect, place)
+    grown, train = space.grown(candidate), space.problem.of("train")
+    fit = polish(grown, np.zeros(grown.size), train, 2)
+    widths = CALIBRATED * half_widths(fit, train)[-2:]
+    for sure, expected in (((0.0, 0.0), False), ((0.0, 10.0), is_enough), ((10.0, 0.0), True)):
+        z = np.r_[fit.z[:-2], np.array(sure) * np.maximum(widths, 0.1)]
+        assert is_there(replace(fit, z=z), candidate, train) == expected
