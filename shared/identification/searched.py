@@ -93,10 +93,15 @@ class Search:
 
 
 def is_open(found: Search) -> bool:
-    """Return whether more is left than a verdict that names causes, or none, may leave."""
+    """Return whether more is left than a verdict that names causes, or none, may leave.
+
+    Links far from what is known of them say that the base is of another kind than the arm: what
+    takes much off then may be anything, so it has to take off all.
+    """
     base, left = float(found.base_losses.mean()), float(found.current_losses.mean())
     if found.accepted:
-        return left > max(BESIDE_A_NAME, MAY_BE_LEFT * base)
+        may_be_left = 0.0 if found.doubted else MAY_BE_LEFT * base
+        return left > max(BESIDE_A_NAME, may_be_left)
     return base > NEARLY_NOISE
 
 

@@ -140,6 +140,17 @@ def test_a_cause_that_leaves_too_much_is_not_believed(searches: Searches):
     assert "too much is left over" in found.candidates[0].why_not
 
 
+@pytest.mark.parametrize(("doubted", "word"), [((), "named"), (("mass elbow",), "unexplained")])
+def test_a_share_of_much_may_be_left_unless_links_are_far_from_what_is_known(
+    searches: Searches, doubted: tuple[str, ...], word: str
+):
+    much = 100.0 * _BAD
+    found = conclude(
+        searches.search(much, searches.tried(ELBOW, much, 0.05 * much), doubted=doubted), ()
+    )
+    assert found.word == word
+
+
 def test_links_far_from_what_is_known_of_them_make_the_base_too_coarse(searches: Searches):
     found = conclude(searches.search(_BAD, doubted=("mass elbow",)), ())
     assert (found.word, found.causes) == ("base_too_coarse", ())
