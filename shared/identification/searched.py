@@ -22,6 +22,8 @@ BESIDE_A_NAME = 1.7
 MAY_BE_LEFT = 0.08
 """Share of the base fit's mean square residual that named causes may leave where that is more:
 what is far larger than the noise is never modelled to the last digit."""
+BESIDE_A_DOUBT = 10.0
+"""The most that it may be where the base itself is doubted: more than that may hide anything."""
 
 
 @dataclass(frozen=True)
@@ -96,12 +98,12 @@ def is_open(found: Search) -> bool:
     """Return whether more is left than a verdict that names causes, or none, may leave.
 
     Links far from what is known of them say that the base is of another kind than the arm: what
-    takes much off then may be anything, so it has to take off all.
+    takes much off then may be anything, so it has to take off nearly all.
     """
     base, left = float(found.base_losses.mean()), float(found.current_losses.mean())
     if found.accepted:
-        may_be_left = 0.0 if found.doubted else MAY_BE_LEFT * base
-        return left > max(BESIDE_A_NAME, may_be_left)
+        most = BESIDE_A_DOUBT if found.doubted else np.inf
+        return left > max(BESIDE_A_NAME, min(MAY_BE_LEFT * base, most))
     return base > NEARLY_NOISE
 
 

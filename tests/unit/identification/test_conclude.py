@@ -144,7 +144,7 @@ def test_a_cause_that_leaves_too_much_is_not_believed(searches: Searches):
 def test_a_share_of_much_may_be_left_unless_links_are_far_from_what_is_known(
     searches: Searches, doubted: tuple[str, ...], word: str
 ):
-    much = 100.0 * _BAD
+    much = 100.0 * _BAD  # of 1,000 floors 50 are left
     found = conclude(
         searches.search(much, searches.tried(ELBOW, much, 0.05 * much), doubted=doubted), ()
     )
