@@ -127,7 +127,7 @@ def _verdict(
         base=conclusion.base,
         caveats=(
             *_uncounted(found),
-            *filter(None, [far_from_file(found.current), _coarse_step(found)]),
+            *filter(None, [far_from_file(found.current), coarse_step(found.base)]),
             *(f"{each.trajectory}: {each.text}".lstrip(": ") for each in dataset.caveats),
         ),
         record_next=_record_next(conclusion, dataset),
@@ -140,10 +140,6 @@ def _verdict(
         cpu_s=sum(seconds.values()),
         seconds=seconds,
     )
-
-
-def _coarse_step(found: Search) -> str:
-    return coarse_step(found.base, found.problem.of("test"))
 
 
 def _uncounted(found: Search) -> tuple[str, ...]:

@@ -21,37 +21,40 @@ _LITTLE = 0.5
 """What a smaller step should leave of it."""
 
 
-def step_error(fit: Fit, segments: tuple[int, ...]) -> Float64:
+def step_error(fit: Fit) -> Float64:
     """Return float64[J], by how much joints are off for the time step, in noise floors (RMS).
 
     Twice what half of the step changes: the error of a method of first order.
 
     Args:
-        fit: of a model without causes.
-        segments: recordings to look at.
+        fit: of a model without causes; looked at is what it was not fitted to.
     """
-    problem = fit.space.problem
-    subject, variant = problem.subject, fit.space.variant(fit.z)
-    plant = finer(subject.plant, 0.5 * subject.plant.timestep)
-    halved = replace(subject, plant=plant, nominal=Rollouts(plant, (), len(segments)))
-    other = Problem(halved, problem.dataset, problem.parameters, problem.noise, problem.window)
+    return 2.0 * changed_by(fit, 0.5 * fit.space.problem.subject.plant.timestep)
+
+
+def changed_by(fit: Fit, timestep: float) -> Float64:
+    """Return float64[J], by how much another time step (s) moves joints, in noise floors (RMS)."""
+    problem, variant = fit.space.problem, fit.space.variant(fit.z)
+    test = problem.of("test")
+    plant = finer(problem.subject.plant, timestep)
+    subject = replace(problem.subject, plant=plant, nominal=Rollouts(plant, (), len(test)))
+    other = Problem(subject, problem.dataset, problem.parameters, problem.noise, problem.window)
     joints = len(subject.joints)
-    (before,), (after,) = (each.residuals([variant], segments) for each in (problem, other))
+    (before,), (after,) = (each.residuals([variant], test) for each in (problem, other))
     changed = [one[:, :joints] - two[:, :joints] for one, two in zip(before, after, strict=True)]
-    return 2.0 * np.sqrt(np.mean(np.concatenate(changed) ** 2, axis=0))
+    return np.sqrt(np.mean(np.concatenate(changed) ** 2, axis=0))
 
 
-def coarse_step(fit: Fit, segments: tuple[int, ...]) -> str:
+def coarse_step(fit: Fit) -> str:
     """Return in words that the time step is too long for what was recorded; empty if it is not.
 
     Args:
         fit: of a model without causes.
-        segments: recordings to look at.
     """
     subject = fit.space.problem.subject
     if subject.control == "pose":  # its damping is taken in the middle of a step
         return ""
-    off = step_error(fit, segments)
+    off = step_error(fit)
     worst = int(np.argmax(off))
     if not off[worst] > _MUCH:
         return ""

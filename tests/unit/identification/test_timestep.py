@@ -7,9 +7,7 @@ import pytest
 
 from shared.identification.fit import Fit, polish
 from shared.identification.space import Space
-from shared.identification.timestep import coarse_step, step_error
-from shared.sim.plant.plant import finer
-from shared.sim.plant.rollouts import Rollouts
+from shared.identification.timestep import changed_by, coarse_step, step_error
 from tests.measured import measure, problem_of
 
 
@@ -29,23 +27,14 @@ def with_noise(fit: Fit, factor: float) -> Fit:
 
 
 def test_it_is_what_far_smaller_steps_change(fit: Fit):
-    problem = fit.space.problem
-    test = problem.of("test")
-    plant = finer(problem.subject.plant, problem.subject.plant.timestep / 16)
-    subject = replace(problem.subject, plant=plant, nominal=Rollouts(plant, (), 4))
-    small = replace(problem, subject=subject, _structures={})
-    variant = fit.space.variant(fit.z)
-    (one,), (other,) = problem.residuals([variant], test), small.residuals([variant], test)
-    changed = np.concatenate(one)[:, :3] - np.concatenate(other)[:, :3]
-    expected = np.sqrt(np.mean(changed**2, axis=0))
-    np.testing.assert_allclose(step_error(fit, test), expected, rtol=0.15)
+    expected = changed_by(fit, fit.space.problem.subject.plant.timestep / 16)
+    np.testing.assert_allclose(step_error(fit), expected, rtol=0.15)
 
 
 def test_it_is_told_where_encoders_show_it(fit: Fit):
-    test = fit.space.problem.of("test")
-    off = float(step_error(fit, test).max())
-    assert coarse_step(with_noise(fit, 1.01 * off), test) == ""
-    told = coarse_step(with_noise(fit, off / 8.1), test)
+    off = float(step_error(fit).max())
+    assert coarse_step(with_noise(fit, 1.01 * off)) == ""
+    told = coarse_step(with_noise(fit, off / 8.1))
     assert "at 2 ms" in told
     assert "8.1 times the noise" in told
     assert "timestep=6e-05 leaves 0.5" in told  # a 32nd
