@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from shared.identification.certainty import is_there
+from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
 from shared.identification.fit import Fit, polish
 from shared.identification.gate import compare, stretches
@@ -36,9 +37,8 @@ def _doubtful(accepted: list[Tried]) -> list[Tried]:
 
 def _without(found: Search, each: Tried, train: tuple[int, ...], test: tuple[int, ...]) -> Model:
     """Return everything that was accepted but one."""
-    kept = tuple(other.candidate for other in found.accepted if other is not each)
+    kept, z = _apart_from(found, {each.candidate})
     space = Space(found.problem, kept)
-    z = np.delete(found.current.z, found.current.space.where(each.candidate))
     fit = polish(space, z, train, 2)
     return Model(fit, stretches(found.problem, space.variant(fit.z), test))
 
@@ -67,7 +67,7 @@ def one_for_many(found: Search, train: tuple[int, ...], test: tuple[int, ...]) -
             is_fewer = other.candidate.effect.name != name and other.numbers <= numbers
             if not is_fewer or other.is_event or not other.gain.is_sure:
                 continue
-            fit = _instead(found, {one.candidate for one in kept}, other, train)
+            fit = _instead(found, {one.candidate for one in many}, other, train)
             losses = stretches(found.problem, fit.space.variant(fit.z), test)
             margin = compare(losses, found.current_losses, found.rng)
             whole = compare(found.base_losses, losses, found.rng)
@@ -80,13 +80,18 @@ def one_for_many(found: Search, train: tuple[int, ...], test: tuple[int, ...]) -
 
 
 def _instead(
-    found: Search, kept: set[Candidate], other: Tried, train: tuple[int, ...]
+    found: Search, gone: set[Candidate], other: Tried, train: tuple[int, ...]
 ) -> Fit:  # fmt: skip
-    """Return a fit of some of what was accepted, and of another cause in place of the rest."""
-    full = found.current.space
-    gone = [each for each in full.candidates if each not in kept]
-    indices = np.concatenate([np.arange(full.size)[full.where(each)] for each in gone])
-    rest = tuple(each for each in full.candidates if each in kept)
-    space = Space(found.problem, (*rest, other.candidate))
-    start = np.r_[np.delete(found.current.z, indices), other.fit.z[-other.numbers :]]
+    """Return a fit of what was accepted, with another cause in place of some."""
+    kept, z = _apart_from(found, gone)
+    space = Space(found.problem, (*kept, other.candidate))
+    start = np.r_[z, other.fit.z[-other.numbers :]]
     return polish(space, space.clip(start), train, 4)
+
+
+def _apart_from(found: Search, gone: set[Candidate]) -> tuple[tuple[Candidate, ...], Float64]:
+    """Return what was accepted but some, and where the fit has the rest: float64[n]."""
+    full = found.current.space
+    indices = np.concatenate([np.arange(full.size)[full.where(each)] for each in gone])
+    kept = tuple(each for each in full.candidates if each not in gone)
+    return kept, np.delete(found.current.z, indices)

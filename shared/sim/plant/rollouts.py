@@ -105,7 +105,7 @@ class Rollouts:
         self._expanded: dict[str, Float64] = {}
         self._stale: set[str] = set()
         self._needs_constants = False
-        self._drive_before = np.empty(0)
+        self._drive_before = self._speed_before = self._rotors = np.empty(0)
         adr = int(self.model.sensor(f"{TOOL}/position").adr[0])
         self._tool = slice(adr, adr + 7)
 
