@@ -100,18 +100,9 @@ def test_where_every_joint_rubs_every_joint_is_named(tmp_path: Path):
     real = mujoco.MjModel.from_xml_string(arm(0.5e-3, damping, FRICTION, mass))
     real.dof_solimp[:, :2] = 0.999, 0.9999  # what sticks does not creep
     splits = {"one": "train", "two": "train", "three": "train", "four": "test", "five": "test"}
-    dataset = Dataset(
-        folder=tmp_path,
-        source=ModelSource("mjcf", path),
-        control="torque",
-        joints=JOINTS,
-        actuators=JOINTS,
-        trajectories=tuple(
-            recording(real, nominal, name, split, rng) for name, split in splits.items()
-        ),
-        caveats=(),
-        hash="",
-    )
+    made = tuple(recording(real, nominal, name, split, rng) for name, split in splits.items())
+    source = ModelSource("mjcf", path)
+    dataset = Dataset(tmp_path, source, "torque", JOINTS, JOINTS, made, (), "")
     verdict = identify(dataset).verdict
     assert verdict.verdict == "named"
     assert {cause.effect for cause in verdict.causes} == {"coulomb_friction"}

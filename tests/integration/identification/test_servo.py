@@ -82,18 +82,9 @@ def test_a_servos_friction_is_told_by_its_laws(tmp_path: Path, seconds: float, e
     path = tmp_path / "servo.xml"
     path.write_text(MODEL)
     rng = np.random.default_rng(1)
-    dataset = Dataset(
-        folder=tmp_path,
-        source=ModelSource("mjcf", path),
-        control="position",
-        joints=("servo",),
-        actuators=("servo",),
-        trajectories=tuple(
-            recording(name, motion, seconds, excess, rng) for name, motion in MOTIONS.items()
-        ),
-        caveats=(),
-        hash="",
-    )
+    source, names = ModelSource("mjcf", path), ("servo",)
+    made = tuple(recording(name, motion, seconds, excess, rng) for name, motion in MOTIONS.items())
+    dataset = Dataset(tmp_path, source, "position", names, names, made, (), "")
     verdict = identify(dataset).verdict
     assert verdict.verdict == "named"
     found = {cause.effect: cause for cause in verdict.causes}
