@@ -23,6 +23,7 @@ from shared.clock import SystemClock
 from shared.config.site import nearest
 from shared.errors import ConfigError
 from shared.identification.catalogue import effects
+from shared.identification.dataset.caveats import in_words
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.dataset.types import Dataset, ModelSource
 from shared.identification.find import identify
@@ -196,7 +197,7 @@ def _opening(dataset: Dataset, out: Path) -> str:
     seconds = sum(each.duration for each in dataset.trajectories)
     return (
         f"{len(dataset.joints)} joints, {train} recordings to fit and {test} held out, "
-        f"{seconds:.0f} s in all, {len(dataset.caveats)} caveats; writes to {out}"
+        f"{seconds:.0f} s in all, {len(in_words(dataset.caveats))} caveats; writes to {out}"
     )
 
 

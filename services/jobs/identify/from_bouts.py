@@ -19,6 +19,7 @@ from services.robot_io.poses import pose_of
 from services.robot_io.vive.calibration import Calibration, load_calibration
 from services.robot_io.vive.frames import composed
 from shared.errors import IdentificationError
+from shared.identification.dataset.caveats import in_words
 from shared.identification.dataset.logs import Log, Rows, data_set, rising
 from shared.identification.dataset.reading import NANO, read_dataset
 from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource
@@ -79,8 +80,8 @@ def report(folder: Path) -> None:
         f"wrote {folder}: {len(made.train)} recordings to fit and {len(made.test)} held out, "
         f"{seconds:.0f} s of {len(made.joints)} joints"
     )
-    for each in made.caveats:
-        print(f"{each.name}{f' ({each.trajectory})' if each.trajectory else ''}: {each.text}")
+    for each in in_words(made.caveats):
+        print(each)
 
 
 def of_bouts(

@@ -1,10 +1,12 @@
 """What limits a usable recording: named, with the value and what to do."""
 
+import re
 from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
+from shared.identification.dataset.beginnings import LEAST, first_velocities
 from shared.identification.dataset.checks import is_resolved, velocity_ratio
 from shared.identification.dataset.types import Caveat, Control, Float64, Trajectory
 
@@ -16,13 +18,13 @@ LEAST_RANGE: Final = 0.02
 """A joint that moves less (rad, m) shows little."""
 LEAST_SPEED: Final = 0.05
 """A joint that is slower (rad/s, m/s) shows little."""
-START: Final = 0.1
-"""From whose readings the first speed is judged (s)."""
 HIGHEST_SPEED: Final = 30.0
 """Of an arm's joint (rad/s, m/s)."""
 COARSE: Final = 1e-3
 """Steps of an encoder (rad, m)."""
 SLOWEST_HZ: Final = 40.0
+FASTER: Final = 1.5
+"""Times the fastest motion that is fitted to: what is held out says nothing of the fit then."""
 ALIKE: Final = 0.05
 """Share of a command's own movement by which two commands differ that are nearly the same."""
 JUMP_SPEED: Final = 10.0
@@ -30,6 +32,27 @@ JUMP_SPEED: Final = 10.0
 JUMP: Final = 0.03
 """m."""
 NAMED_HOLES: Final = 3
+MOST_NAMED: Final = 4
+"""Recordings that are named beside the first that a caveat is about."""
+_NUMBER: Final = re.compile(r"(?<![\w.'])[-+]?\d+(\.\d+)?(e[-+]?\d+)?(?![\w'])")
+"""Not part of a name."""
+
+
+def in_words(caveats: Sequence[Caveat]) -> tuple[str, ...]:
+    """Return caveats as sentences; what many recordings share but for its numbers is said once."""
+    alike: dict[str, list[Caveat]] = {}
+    for each in caveats:
+        alike.setdefault(_NUMBER.sub("#", each.text), []).append(each)
+    said: list[str] = []
+    for first, *others in alike.values():
+        names = (
+            [f"{len(others)} more"]
+            if len(others) > MOST_NAMED
+            else [each.trajectory for each in others]
+        )
+        too = f" (much the same: {', '.join(names)})" if others else ""
+        said.append(f"{first.trajectory}: {first.text}{too}".lstrip(": "))
+    return tuple(said)
 
 
 def of_times(name: str, stream: str, times: Float64) -> list[Caveat]:
@@ -90,13 +113,19 @@ def of_start(trajectory: Trajectory, has_initial: bool, has_velocity: bool) -> l
             "command is taken to hold from the start"
         )))  # fmt: skip
     if not has_velocity:
-        count = min(len(joints_at), max(5, round(START / period)))
-        powers = np.vander(joints_at[:count] - joints_at[0], min(3, count))
-        slopes = np.linalg.lstsq(powers, trajectory.q[:count], rcond=None)[0][-2]
-        speed = float(np.abs(slopes).max())
-        if speed > 2.0 * LEAST_SPEED:
+        speeds = np.abs(first_velocities(joints_at, trajectory.q)[0])
+        fastest = int(np.argmax(speeds))
+        if speeds[fastest] > LEAST:
+            is_taken = bool(trajectory.initial_qd[fastest])
+            taken = (
+                "which is taken from its first readings"
+                if is_taken
+                else (
+                    "and is taken to be at rest, as its first readings do not surely show a speed"
+                )
+            )
             found.append(Caveat("moving_start", name, (
-                f"the arm starts at {speed:.3g} rad/s, and is taken to be at rest; give "
+                f"the arm starts at {speeds[fastest]:.3g} rad/s, {taken}; give "
                 "initial_velocity, or log velocities"
             )))  # fmt: skip
     return found
@@ -185,11 +214,20 @@ def of_set(
 
 
 def _excitation(trajectories: Sequence[Trajectory], joints: Sequence[str]) -> list[Caveat]:
+    """Return ``little_excitation`` and ``faster_test``."""
     found: list[Caveat] = []
     train = [each for each in trajectories if each.split == "train"]
     for index, joint in enumerate(joints):
         span = max(float(np.ptp(each.q[:, index])) for each in train)
         speed = max(_speed(each, index) for each in train)
+        held_out = [each for each in trajectories if each.split == "test"]
+        fastest = max(held_out, key=lambda each: _speed(each, index))
+        if _speed(fastest, index) > FASTER * max(speed, LEAST_SPEED):
+            found.append(Caveat("faster_test", fastest.name, (
+                f"joint {joint!r} goes at up to {_speed(fastest, index):.2g} rad/s (m/s), held "
+                f"out, and at {speed:.2g} in what is fitted to: limits and friction at such "
+                "speeds cannot be fitted; have fast motion in both"
+            )))  # fmt: skip
         if span < LEAST_RANGE or speed < LEAST_SPEED:
             found.append(Caveat("little_excitation", "", (
                 f"joint {joint!r} moves by {span:.2g} rad (m) at up to {speed:.2g} rad/s (m/s) in "

@@ -9,6 +9,7 @@ import numpy as np
 from shared.config.site import nearest
 from shared.errors import IdentificationError
 from shared.identification.dataset import caveats, checks
+from shared.identification.dataset.beginnings import surely_moving
 from shared.identification.dataset.manifest import (
     FILE,
     Manifest,
@@ -133,11 +134,11 @@ def _trajectory(
         sent = np.stack([command.columns[each] for each in actuators], axis=1)
         if manifest.control == "position":
             _check_units(recording, joints, q)
-    still = np.zeros(len(joints)) if qd is None else qd[0]
+    speed = surely_moving(times, q) if qd is None else qd[0]
     made = Trajectory(
         name, entry.split, entry.repeats,
         _initial(path, entry, "initial", joints, q[0], manifest.model),
-        _initial(path, entry, "initial_velocity", joints, still, manifest.model),
+        _initial(path, entry, "initial_velocity", joints, speed, manifest.model),
         _seconds(command, zero), sent, times, q, qd, effort,
     )  # fmt: skip
     made, clock = _tracked(made, recording.tracker, zero)

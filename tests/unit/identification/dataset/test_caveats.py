@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from shared.identification.dataset.caveats import in_words
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.dataset.types import Caveat
 from tests.unit.identification.dataset.folders import (
@@ -159,9 +160,53 @@ def test_a_late_start_of_either_is_told(tmp_path):
     assert "0.4 s after the first reading" in the(folder, "late_command").text
 
 
-def test_a_start_in_motion_without_velocities_is_told(tmp_path):
+def test_a_start_in_motion_without_velocities_is_told_and_taken(tmp_path):
     folder = written(tmp_path)
     joints = rows(motion(1), slice(50, None))
-    del joints["qd_elbow"], joints["qd_shoulder"]
+    logged = float(joints.pop("qd_elbow")[0]), float(joints.pop("qd_shoulder")[0])
     rewritten(folder, 1, joints)
-    assert "rad/s, and is taken to be at rest" in the(folder, "moving_start").text
+    assert "rad/s, which is taken from its first readings" in the(folder, "moving_start").text
+    taken = read_dataset(folder).trajectories[1].initial_qd
+    assert sorted(taken) == pytest.approx(sorted(logged), rel=0.02, abs=0.02)
+
+
+def test_a_start_that_may_be_of_rest_is_told_and_taken_for_rest(tmp_path):
+    folder = written(tmp_path)
+    joints = motion(1)
+    del joints["qd_elbow"], joints["qd_shoulder"]
+    joints["q_elbow"] = joints["q_elbow"] + 0.0
+    joints["q_elbow"][[0, 1, 4, 7]] += 0.03
+    rewritten(folder, 1, joints)
+    assert "and is taken to be at rest" in the(folder, "moving_start").text
+    assert not read_dataset(folder).trajectories[1].initial_qd.any()
+
+
+def test_a_held_out_motion_much_faster_than_what_is_fitted_to_is_told(tmp_path):
+    folder = written(tmp_path)
+    quick = motion(2)
+    quick["q_elbow"] = quick["q_elbow"][0] + 4.0 * (quick["q_elbow"] - quick["q_elbow"][0])
+    quick.pop("qd_elbow")
+    quick.pop("qd_shoulder")
+    rewritten(folder, 2, quick)
+    found = the(folder, "faster_test")
+    assert found.trajectory == "three"
+    assert "joint 'elbow' goes at up to" in found.text
+
+
+def test_what_recordings_share_but_for_its_numbers_is_said_once():
+    def of(trajectory: str, text: str) -> Caveat:
+        return Caveat("any", trajectory, text)
+
+    said = in_words([
+        of("a", "joint 'j_1' is read in steps of 0.00153 rad (m), 253 values"),
+        of("a", "joint 'j_2' is read in steps of 0.00153 rad (m), 253 values"),
+        of("b", "joint 'j_1' is read in steps of 1.6e-03 rad (m), 9 values"),
+        of("", "nothing is known"),
+        *(of(f"r{number}", f"late by {number} ms") for number in range(7)),
+    ])  # fmt: skip
+    assert said == (
+        "a: joint 'j_1' is read in steps of 0.00153 rad (m), 253 values (much the same: b)",
+        "a: joint 'j_2' is read in steps of 0.00153 rad (m), 253 values",
+        "nothing is known",
+        "r0: late by 0 ms (much the same: 6 more)",
+    )
