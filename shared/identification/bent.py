@@ -22,7 +22,7 @@ from shared.identification.gate import compare, stretches
 from shared.identification.problem import Problem
 from shared.identification.progress import Progress
 from shared.identification.screen import Screened, screen
-from shared.identification.searched import Otherwise, Search, Tried
+from shared.identification.searched import NEARLY_NOISE, Otherwise, Search, Tried
 from shared.identification.sentence import label
 from shared.identification.space import Space
 from shared.identification.verdict import Cause, Interval, Tie
@@ -41,6 +41,8 @@ _STEPS, _ENOUGH = 12, 1e-4
 """Of a fit: what pulls a base back is a small part of the cost."""
 _TOLD = 5
 """Parameters that are told as far from the model file."""
+_SPOILED = 1.2
+"""Times what the model file leaves, that a fit which carries over never does."""
 _SLIGHT = 15.0
 """What a cause must take off what speaks against the base, a sum of squares of standard deviations
 halved: one number that is 5.5 of them off."""
@@ -196,6 +198,22 @@ def far_from_file(fit: Fit) -> str:
         for index in _surely_far(fit)[:_TOLD]
     ]
     return f"the base is far from the model file: {listing(said)} what it says" if said else ""
+
+
+def worse_than_file(found: Search) -> str:
+    """Return in words that what was fitted does not carry over to what was held out, or nothing.
+
+    Of motion faster, or elsewhere, than what it was fitted to a fit may say less than the file.
+    """
+    fitted, file = (
+        float(np.sqrt(each.mean())) for each in (found.current_losses, found.nominal_losses)
+    )
+    if fitted < _SPOILED * file or fitted**2 < NEARLY_NOISE:
+        return ""
+    return (
+        f"held out, the fitted model is at {fitted:.3g} and the model file as it is at "
+        f"{file:.3g}: what was fitted does not carry over to that motion"
+    )
 
 
 def _base_cause(other: Otherwise) -> Cause:

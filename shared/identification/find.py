@@ -9,9 +9,10 @@ import numpy as np
 
 from shared.identification.again import fresh, leave_out
 from shared.identification.begin import begin
-from shared.identification.bent import far_from_file, otherwise
+from shared.identification.bent import far_from_file, otherwise, worse_than_file
 from shared.identification.catalogue import effects
 from shared.identification.conclude import Conclusion, conclude, extended
+from shared.identification.dataset.caveats import in_words
 from shared.identification.dataset.types import Dataset
 from shared.identification.effect import Effect
 from shared.identification.evidence import Evidence
@@ -127,8 +128,11 @@ def _verdict(
         base=conclusion.base,
         caveats=(
             *_uncounted(found),
-            *filter(None, [far_from_file(found.current), coarse_step(found.base)]),
-            *(f"{each.trajectory}: {each.text}".lstrip(": ") for each in dataset.caveats),
+            *filter(
+                None,
+                [worse_than_file(found), far_from_file(found.current), coarse_step(found.base)],
+            ),
+            *in_words(dataset.caveats),
         ),
         record_next=_record_next(conclusion, dataset),
         starts_agree=found.base.starts_agree,

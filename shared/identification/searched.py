@@ -98,10 +98,13 @@ def is_open(found: Search) -> bool:
     """Return whether more is left than a verdict that names causes, or none, may leave.
 
     Links far from what is known of them say that the base is of another kind than the arm: what
-    takes much off then may be anything, so it has to take off nearly all.
+    takes much off then may be anything, so it has to take off nearly all. So may what only mends
+    what a base fit had spoiled, of motion unlike what it was fitted to.
     """
     base, left = float(found.base_losses.mean()), float(found.current_losses.mean())
     if found.accepted:
+        if left >= float(found.nominal_losses.mean()):
+            return True
         most = BESIDE_A_DOUBT if found.doubted else np.inf
         return left > max(BESIDE_A_NAME, min(MAY_BE_LEFT * base, most))
     return base > NEARLY_NOISE

@@ -1,7 +1,9 @@
 """Says in a sentence or two what a search comes to."""
 
+import msgspec
+
 from shared.identification.searched import NEARLY_NOISE
-from shared.identification.verdict import Cause, HeldOut, Tie, Unexplained, Word
+from shared.identification.verdict import Cause, HeldOut, Interval, Tie, Unexplained, Word
 from shared.telemetry.wording import listing
 
 
@@ -35,9 +37,12 @@ def sentence_of(
         )
     if causes:
         names = " and ".join(f"{label(cause)} ({_size(cause)})" for cause in causes)
+        why = "which is too much to believe it"
+        if held_out.extended >= held_out.nominal:
+            why = f"and the model file as it is {held_out.nominal:.2f}"
         return (
             f"Something is wrong that no effect of the catalogue explains. Nearest comes {names}, "
-            f"but from {ratio} it leaves {held_out.extended:.2f}, which is too much to believe it."
+            f"but from {ratio} it leaves {held_out.extended:.2f}, {why}."
         )
     if left and all(each.is_external for each in left):
         return f"Nothing to name but what came from outside.{_also_pushed(left)}"
@@ -81,7 +86,29 @@ def _named(causes: tuple[Cause, ...]) -> str:
     return " and ".join(f"{title} {listing(each)}" for title, each in places.items())
 
 
+def as_told(cause: Cause) -> Cause:
+    """Return a cause with a size for people: of what is sought as one over it, the thing itself.
+
+    ``inverse_limit`` in 1/(N m) is a limit in N m; its upper end is infinite where the inverse may
+    be 0, which is no limit.
+    """
+    name = cause.quantity.removeprefix("inverse_")
+    if name == cause.quantity or not cause.value > 0.0:
+        return cause
+    low, high = cause.interval.low, cause.interval.high
+    return msgspec.structs.replace(
+        cause,
+        quantity=name,
+        value=1.0 / cause.value,
+        unit=cause.unit.removeprefix("1/").strip("()"),
+        interval=Interval(low=1.0 / high, high=1.0 / low if low > 0.0 else float("inf")),
+    )
+
+
 def _size(cause: Cause) -> str:
-    half = (cause.interval.high - cause.interval.low) / 2
-    unit = "" if cause.unit == "1" else f" {cause.unit}"
-    return f"{cause.quantity} {cause.value:.3g} ± {half:.1g}{unit}"
+    told = as_told(cause)
+    unit = "" if told.unit == "1" else f" {told.unit}"
+    if told.interval.high == float("inf"):
+        return f"{told.quantity} {told.value:.3g}{unit}, at least {told.interval.low:.3g}"
+    half = (told.interval.high - told.interval.low) / 2
+    return f"{told.quantity} {told.value:.3g} ± {half:.1g}{unit}"

@@ -6,6 +6,7 @@ from services.jobs.identify import considered, pictures, words
 from services.jobs.identify.residuals import stages_of
 from shared.identification.evidence import Evidence
 from shared.identification.model_file import Carried
+from shared.identification.sentence import as_told
 from shared.identification.verdict import Cause, Verdict
 from shared.telemetry import html
 from shared.telemetry.html import Html, Node, tag
@@ -81,7 +82,7 @@ def _tiles(verdict: Verdict) -> list[tuple[Node, Node, str]]:
             f"{cause.quantity}: {cause.effect.replace('_', ' ')}, {words.where_text(cause.where)}",
             "good",
         )
-        for cause in verdict.causes[:2]
+        for cause in map(as_told, verdict.causes[:2])
     ]
     if verdict.causes:
         tiles.append((
@@ -133,8 +134,8 @@ def _cause(cause: Cause) -> Html:
         ("effect", tag("code", cause.effect)),
         ("where", words.where_text(cause.where)),
         (
-            f"{cause.quantity} (95 %)",
-            tag("b", words.quantity_text(cause.value, cause.unit, cause.interval)),
+            f"{as_told(cause).quantity} (95 %)",
+            tag("b", words.size_text(cause)),
         ),
         *((name, words.number_text(value)) for name, value in cause.others.items()),
         ("explains by itself", words.share_text(cause.share, cause.share_interval)),

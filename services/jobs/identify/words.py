@@ -3,6 +3,7 @@
 import textwrap
 from pathlib import Path
 
+from shared.identification.sentence import as_told
 from shared.identification.verdict import Cause, HeldOut, Interval, Tie, Unexplained, Verdict
 
 WIDTH = 88
@@ -32,6 +33,8 @@ def number_text(value: float, digits: int = 3) -> str:
     """Return a number with some significant digits and a proper minus, without powers of ten."""
     if value != value:
         return "not known"
+    if abs(value) == float("inf"):
+        return f"{MINUS if value < 0.0 else ''}\N{INFINITY}"
     text = f"{value:.{digits}g}"
     if "e" in text and 1e-6 < abs(value) < 1e7:
         decimals = max(0, digits - 1 - int(text.partition("e")[2]))
@@ -66,8 +69,13 @@ def where_text(where: str) -> str:
 def cause_text(cause: Cause) -> str:
     """Return a cause in a line: what, where, how large, how sure."""
     where = f" at {cause.where}" if cause.where else ""
-    size = quantity_text(cause.value, cause.unit, cause.interval)
-    return f"{cause.title}{where}: {cause.quantity} {size}"
+    return f"{cause.title}{where}: {as_told(cause).quantity} {size_text(cause)}"
+
+
+def size_text(cause: Cause) -> str:
+    """Return how large a cause is, with its 95 % interval."""
+    told = as_told(cause)
+    return quantity_text(told.value, told.unit, told.interval)
 
 
 def share_text(share: float, interval: Interval | None = None) -> str:

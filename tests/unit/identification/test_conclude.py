@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from shared.identification.bent import worse_than_file
 from shared.identification.conclude import conclude
 from shared.identification.searched import Otherwise
 from shared.identification.verdict import Unexplained
@@ -138,6 +139,22 @@ def test_a_cause_that_leaves_too_much_is_not_believed(searches: Searches):
     assert (found.word, found.causes) == ("unexplained", ())
     assert "too much to believe" in found.sentence
     assert "too much is left over" in found.candidates[0].why_not
+
+
+def test_a_cause_beside_which_the_model_file_does_better_is_not_believed(searches: Searches):
+    found = searches.search(100.0 * _BAD, searches.tried(DRAG, 100.0 * _BAD, 5.0 * _BAD))
+    assert conclude(found, ()).word == "named"
+    assert worse_than_file(found) == ""
+    nearer = dataclasses.replace(found, nominal_losses=3.0 * _BAD)
+    told = conclude(nearer, ())
+    assert (told.word, told.causes) == ("unexplained", ())
+    assert "it leaves 7.07, and the model file as it is 5.48" in told.sentence
+    assert "is at 7.07 and the model file as it is at 5.48" in worse_than_file(nearer)
+
+
+def test_a_fit_at_the_noise_is_not_said_to_be_worse_than_the_file(searches: Searches):
+    found = dataclasses.replace(searches.search(_GOOD), nominal_losses=0.5 * _GOOD)
+    assert worse_than_file(found) == ""
 
 
 @pytest.mark.parametrize(("doubted", "word"), [((), "named"), (("mass elbow",), "unexplained")])

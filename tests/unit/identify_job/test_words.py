@@ -6,6 +6,7 @@ import msgspec
 import pytest
 
 from services.jobs.identify.words import (
+    cause_text,
     held_out_text,
     number_text,
     quantity_text,
@@ -14,7 +15,8 @@ from services.jobs.identify.words import (
     unexplained_text,
     verdict_text,
 )
-from shared.identification.verdict import Interval
+from shared.identification.sentence import sentence_of
+from shared.identification.verdict import Cause, Interval
 from tests.unit.identify_job.examples import WORDS, example
 
 
@@ -41,6 +43,22 @@ def test_an_interval_has_the_unit_of_its_value() -> None:
     assert quantity_text(0.02, "s", Interval(low=-0.001, high=0.04)) == (
         "20 ms (\N{MINUS SIGN}1 to 40)"
     )
+
+
+def _limited(low: float) -> Cause:
+    return Cause(
+        effect="torque_saturation", where="elbow", quantity="inverse_limit", value=0.25,
+        unit="1/(N m)", interval=Interval(low=low, high=0.5), title="weak", signature="",
+    )  # fmt: skip
+
+
+def test_a_limit_sought_as_one_over_it_is_told_as_a_limit() -> None:
+    assert cause_text(_limited(0.2)) == "weak at elbow: limit 4 N m (2 to 5)"
+    assert cause_text(_limited(-0.01)) == "weak at elbow: limit 4 N m (2 to \N{INFINITY})"
+    held_out = example("named").verdict.held_out
+    told = [sentence_of("named", (_limited(low),), (), held_out, ()) for low in (0.2, -0.01)]
+    assert "weak at elbow (limit 4 ± 2 N m)." in told[0]
+    assert "weak at elbow (limit 4 N m, at least 2)." in told[1]
 
 
 @pytest.mark.parametrize(
