@@ -196,10 +196,10 @@ def report_of(name: str, measure: Callable[[], Measurement], *, smoke: bool) -> 
         measure: does it.
         smoke: the figures mean nothing.
     """
-    load_before = os.getloadavg()
+    load_before, cores = os.getloadavg(), len(os.sched_getaffinity(0))
     cpu_before, began_at = _cpu_seconds(), time.perf_counter()
     found = measure()
-    machine = describe_machine(load_before)
+    machine = msgspec.structs.replace(describe_machine(load_before), cores=cores)
     return {
         "name": name,
         "value": found.value,

@@ -1,4 +1,5 @@
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,20 @@ def test_the_object_has_the_fields_that_others_rely_on():
     assert report["goal"]["met"] is True
     assert report["checks"][0]["met"] is False
     assert len(report["machine"]["load_before"]) == 3
+
+
+def test_a_script_that_keeps_to_one_core_ran_on_a_machine_of_all_of_them():
+    cores = os.sched_getaffinity(0)
+
+    def measure() -> Measurement:
+        os.sched_setaffinity(0, {min(cores)})
+        ratio = Check(name="x", value=1.0)
+        return Measurement(value=1.0, unit="1", limit=1.0, ratio=ratio, runs=())
+
+    try:
+        assert bench.report_of("try", measure, smoke=False)["machine"]["cores"] == len(cores)
+    finally:
+        os.sched_setaffinity(0, cores)
 
 
 def test_the_text_marks_what_is_met_and_what_is_missed():
