@@ -37,7 +37,7 @@ class Searches:
 
     def tried(
         self, candidate: Candidate, before: Float64, after: Float64, numbers: int = 1,
-        is_event: bool = False,
+        is_event: bool = False, fitted: Float64 | None = None,
     ) -> Tried:  # fmt: skip
         """Return a candidate that came from one loss to another."""
         if (candidate,) not in self._fits:
@@ -46,7 +46,8 @@ class Searches:
         signature = np.array([1.0, 0.0])
         screened = Screened(candidate, np.ones(numbers), self.base.z, 0.5, signature)
         gain = compare(before, after, np.random.default_rng(0))
-        return Tried(screened, fit, gain, after, is_event)
+        others = np.empty(0) if fitted is None else fitted
+        return Tried(screened, fit, gain, after, is_event, fitted=others)
 
     def search(
         self, base: Float64, accepted: Tried | None = None, rivals: tuple[Tried, ...] = (),

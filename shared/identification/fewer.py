@@ -26,7 +26,7 @@ def prune(found: Search, train: tuple[int, ...], test: tuple[int, ...]) -> None:
             _take_back(found, each, _without(found, each, train, test))
     for each in _doubtful(found.accepted[:-1]):
         without = _without(found, each, train, test)
-        if not judged(found, each.candidate, without, so_far(found)).is_useful(base):
+        if not judged(found, each.candidate, without, so_far(found)).gain.is_useful(base):
             _take_back(found, each, without)
 
 

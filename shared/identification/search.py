@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from shared.identification.certainty import is_there
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import ONCE, Candidate
 from shared.identification.family import Family, look_elsewhere, relatives
@@ -84,16 +85,16 @@ def _round(
         space = Space(found.problem, each.space.candidates)
         fit = settle(space, each.z, train)
         losses = stretches(found.problem, space.variant(fit.z), test)
-        gain = judged(found, each.screened.candidate, so_far(found), Model(fit, losses))
+        gain, fitted = judged(found, each.screened.candidate, so_far(found), Model(fit, losses))
         is_event = _explains_event(found, each.screened.candidate, fit, train)
-        tried.append(Tried(each.screened, fit, gain, losses, is_event))
+        tried.append(Tried(each.screened, fit, gain, losses, is_event, fitted=fitted))
     for one in tried:
         found.tried.setdefault(one.candidate.label, one)
     base = float(found.base_losses.mean())
     useful = [one for one in tried if one.is_event or one.gain.is_useful(base)]
     if not useful:
         return False
-    best, rivals = _simplest(useful, found.rng)
+    best, rivals = _simplest(_sure(useful, train), found.rng)
     rivals = tuple(
         one
         for one in rivals
@@ -101,9 +102,9 @@ def _round(
     )
     fit = polish(best.fit.space, best.fit.z, train, 4, enough=1e-4)
     losses = stretches(found.problem, fit.space.variant(fit.z), test)
-    gain = judged(found, best.candidate, so_far(found), Model(fit, losses))
+    gain, fitted = judged(found, best.candidate, so_far(found), Model(fit, losses))
     if gain.loss <= best.gain.loss and (best.is_event or gain.is_useful(base)):
-        best = Tried(best.screened, fit, gain, losses, best.is_event)
+        best = Tried(best.screened, fit, gain, losses, best.is_event, fitted=fitted)
     best, rivals, family = _elsewhere(found, best, rivals, train, test, progress)
     found.accepted.append(best)
     found.rivals.append(rivals)
@@ -185,17 +186,28 @@ def _explains_event(found: Search, candidate: Candidate, fit: Fit, train: tuple[
     )
 
 
+def _sure(useful: list[Tried], train: tuple[int, ...]) -> list[Tried]:
+    """Return what is surely more than nothing, or all if nothing is, as of two causes by half.
+
+    A spring of no surely known stiffness, whose rest is far off, is a constant torque.
+    """
+    return [
+        one for one in useful if one.is_event or is_there(one.fit, one.candidate, train)
+    ] or useful
+
+
 def _simplest(useful: list[Tried], rng: np.random.Generator) -> tuple[Tried, tuple[Tried, ...]]:
     """Return the cause to take, and those that are not told from it.
 
-    Of what does as well as the best one, the simplest is taken; what needs more numbers to do no
-    better is no rival, unless it is in the nature of both that they are hardly told apart.
+    Each has passed by what was held out; which of them does best, all recordings say. Of what does
+    as well as the best one, the simplest is taken; what needs more numbers to do no better is no
+    rival, unless it is in the nature of both that they are hardly told apart.
     """
-    best = min(useful, key=lambda one: one.gain.loss)
+    best = min(useful, key=_left)
     alike = [one for one in useful if one is best or _is_alike(best, one, rng)]
     fewest = min(one.numbers for one in alike)
     simple = [one for one in alike if one.numbers == fewest]
-    taken = min(simple, key=lambda one: one.gain.loss)
+    taken = min(simple, key=_left)
     near = [one for one in useful if _is_nearly(taken, one, rng)]
     return taken, tuple(one for one in [*simple, *near] if one is not taken)
 
@@ -211,9 +223,13 @@ def _is_nearly(taken: Tried, other: Tried, rng: np.random.Generator) -> bool:
     return margin.gain < margin.error and other.fit.cost <= (1 + _NEARLY) * taken.fit.cost
 
 
+def _left(one: Tried) -> float:
+    return float(one.everywhere.mean())
+
+
 def _is_alike(best: Tried, other: Tried, rng: np.random.Generator) -> bool:
-    """Return whether the held-out recordings do not prefer the best surely."""
-    margin = compare(other.losses, best.losses, rng)
+    """Return whether the recordings do not prefer the best surely."""
+    margin = compare(other.everywhere, best.everywhere, rng)
     return margin.gain < max(margin.error, ALIKE * best.gain.gain)
 
 

@@ -39,11 +39,18 @@ class Tried:
     """Whether it happened once, in a recording that was fitted to, and explains what stood out."""
     is_relative: bool = False
     """Whether it was found at a joint because most others have it."""
+    fitted: Float64 = field(default_factory=lambda: np.empty(0))
+    """float64[R] of stretches of what was fitted to, with sizes in which they have no say."""
 
     @property
     def candidate(self) -> Candidate:
         """Return which."""
         return self.screened.candidate
+
+    @property
+    def everywhere(self) -> Float64:
+        """Return float64[S + R], what it leaves of all recordings."""
+        return np.concatenate([self.losses, self.fitted])
 
     @property
     def numbers(self) -> int:
@@ -123,7 +130,16 @@ def so_far(found: Search) -> Model:
     return Model(found.current, found.current_losses)
 
 
-def judged(found: Search, candidate: Candidate, before: Model, after: Model) -> Gain:
+class Judged(NamedTuple):
+    """What speaks for a cause."""
+
+    gain: Gain
+    """On what was held out."""
+    fitted: Float64
+    """float64[R], see :class:`Tried`."""
+
+
+def judged(found: Search, candidate: Candidate, before: Model, after: Model) -> Judged:
     """Return what a cause takes off what was held out, and how sure that is.
 
     All recordings make it surer, those that were fitted to with the size that the others give it;
@@ -140,4 +156,5 @@ def judged(found: Search, candidate: Candidate, before: Model, after: Model) -> 
     surely = max(gain.surely, min(whole.surely, gain.gain - gain.error))
     if candidate.effect.name == ONCE:
         surely = -np.inf  # there it only frees the base, of whatever it is
-    return replace(gain, surely=surely, is_measured=found.problem.noise.is_measured)
+    gain = replace(gain, surely=surely, is_measured=found.problem.noise.is_measured)
+    return Judged(gain, more.after)

@@ -9,7 +9,12 @@ import pytest
 
 from shared.identification.catalogue.gravity_tilt import EFFECT as TILT
 from shared.identification.catalogue.stribeck_friction import EFFECT as STRIBECK
-from shared.identification.certainty import CALIBRATED, half_widths, is_there
+from shared.identification.certainty import (
+    CALIBRATED,
+    _is_sure,  # pyright: ignore[reportPrivateUsage]
+    half_widths,
+    is_there,
+)
 from shared.identification.effect import Candidate, Effect
 from shared.identification.fit import Fit, polish
 from shared.identification.space import Space
@@ -66,3 +71,24 @@ def test_a_cause_is_there_if_what_is_sure_of_it_does_something(
     for sure, expected in (((0.0, 0.0), False), ((0.0, 10.0), is_enough), ((10.0, 0.0), True)):
         z = np.r_[fit.z[:-2], np.array(sure) * np.maximum(widths, 0.1)]
         assert is_there(replace(fit, z=z), candidate, train) == expected
+
+
+def test_numbers_of_which_only_a_sum_is_known_are_surely_something_together():
+    covariance = np.array([[1.0, -0.97], [-0.97, 1.0]])
+    z = 1.5 * CALIBRATED * np.ones(2)
+    one, both = np.array([0]), np.array([0, 1])
+    assert not _is_sure(z, covariance, one, 30)
+    assert _is_sure(z, covariance, both, 30)
+    assert not _is_sure(z * [1.0, -1.0], covariance, both, 30)
+    assert not _is_sure(z, covariance, both, 2)  # hardly anything to tell it from
+
+
+def test_of_what_is_nothing_a_twentieth_looks_sure():
+    rng = np.random.default_rng(0)
+    spread = rng.normal(size=(3, 3))
+    sure = 0
+    for _ in range(2000):
+        seen = rng.normal(size=(13, 3)) @ spread.T
+        told = np.cov(seen, rowvar=False) / 13.0 / CALIBRATED**2
+        sure += _is_sure(seen.mean(axis=0), told, np.arange(3), 12)
+    assert 0.035 < sure / 2000 < 0.065

@@ -21,7 +21,12 @@ from shared.identification.find import identify
 from shared.identification.hidden.generator import hide
 from shared.identification.hidden.recipe import Recipe, wish_of
 from shared.identification.progress import silent
-from shared.identification.search import _simplest, search  # pyright: ignore[reportPrivateUsage]
+from shared.identification.search import (
+    _simplest,  # pyright: ignore[reportPrivateUsage]
+    _sure,  # pyright: ignore[reportPrivateUsage]
+    search,
+)
+from shared.identification.searched import Tried
 from shared.identification.verdict import Verdict
 from tests.searches import DRAG, ELBOW, LIFT, Searches
 
@@ -56,6 +61,39 @@ def test_a_cause_that_does_surely_worse_is_no_rival_however_simple(searches: Sea
     taken, rivals = _simplest([worse, best], np.random.default_rng(0))
     assert taken is best
     assert rivals == ()
+
+
+def test_which_cause_does_best_is_judged_by_all_recordings(searches: Searches):
+    """Of more numbers, one does a little better held out; where it was fitted to it does not."""
+    rng = np.random.default_rng(0)
+    little, fitted = 0.02 + 0.005 * rng.normal(size=8), 1.0 + 0.1 * rng.normal(size=24)
+    much = searches.tried(DRAG, _BAD, _GOOD, numbers=3)
+    simple = searches.tried(ELBOW, _BAD, _GOOD + little * 10.0)
+    assert _simplest([much, simple], rng)[0] is much
+    more = fitted + 0.2 + 0.2 * rng.normal(size=24)
+    both = replace(much, fitted=more), replace(simple, fitted=fitted)
+    assert _simplest(list(both), rng)[0] is both[1]
+
+
+def test_a_cause_that_may_as_well_be_nothing_is_taken_only_if_all_may(searches: Searches):
+    train = searches.problem.of("train")
+
+    def sized(times: float) -> Tried:
+        one = searches.tried(ELBOW, _BAD, _GOOD + 0.5)
+        z = one.fit.z.copy()
+        z[one.fit.space.where(ELBOW)] *= times
+        return replace(one, fit=replace(one.fit, z=z))
+
+    there, nothing = sized(1e6), sized(1e-6)
+    event = replace(nothing, is_event=True)
+    for useful, sure in (
+        ([nothing, there], [there]),
+        ([nothing], [nothing]),
+        ([event, there], [event, there]),
+    ):
+        found = _sure(useful, train)
+        assert len(found) == len(sure)
+        assert all(one is other for one, other in zip(found, sure, strict=True))
 
 
 def test_turns_so_short_that_they_are_a_delay_are_a_rival_of_it(searches: Searches):
