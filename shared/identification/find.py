@@ -25,6 +25,7 @@ from shared.identification.search import search
 from shared.identification.searched import Search, is_open
 from shared.identification.timestep import coarse_step
 from shared.identification.verdict import Unexplained, Verdict
+from shared.identification.whole import fit_to_all
 from shared.runtime.build import commit
 from shared.runtime.service import version
 
@@ -88,6 +89,8 @@ def identify(
     if not found.accepted and not is_open(found):
         found.otherwise = otherwise(found, progress)
         clock.over("search")
+    fit_to_all(found, left)
+    clock.over("search")
     progress("diagnostics", 0.0)
     evidence = _evidence(found)
     conclusion = conclude(found, left)

@@ -99,6 +99,17 @@ class Search:
     """For each accepted cause, what the data do not tell from it."""
     otherwise: Otherwise | None = None
     """Where nothing was accepted, what does as well as the base alone."""
+    final: Fit | None = None
+    """The current model fitted to all recordings, for sizes; nothing is judged by it."""
+    fitted_to: tuple[int, ...] = ()
+    """Segments of the final fit."""
+
+    @property
+    def told(self) -> tuple[Fit, tuple[int, ...]]:
+        """Return the fit that sizes are told from, and what it was fitted to."""
+        if self.final is None:
+            return self.current, self.problem.of("train")
+        return self.final, self.fitted_to
 
 
 def is_open(found: Search) -> bool:

@@ -17,6 +17,11 @@ BENT = (
     "to believe; where none was, the two are the same."
 )
 
+WHOLE = (
+    "Which causes there are was judged on motion that nothing was fitted to, and what is told of "
+    "held-out motion is of that fit. How large they are is told from a last fit to all recordings."
+)
+
 
 @dataclass(frozen=True)
 class About:
@@ -126,7 +131,7 @@ def _causes(verdict: Verdict, evidence: Evidence) -> Html | None:
         for cause, picture in zip(verdict.causes, shown, strict=True)
     ]
     title = "The cause" if len(verdict.causes) == 1 else "The causes, largest first"
-    return html.section(title, cards)
+    return html.section(title, cards, tag("p", WHOLE))
 
 
 def _cause(cause: Cause) -> Html:

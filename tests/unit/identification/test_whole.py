@@ -1,0 +1,88 @@
+"""The last fit, to all recordings."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shared.identification.catalogue.torque_bias import EFFECT as BIAS
+from shared.identification.conclude import conclude
+from shared.identification.fit import polish
+from shared.identification.searched import Search
+from shared.identification.space import Space
+from shared.identification.verdict import Unexplained
+from shared.identification.whole import fit_to_all
+from shared.sim.plant.row import Row
+from tests.searches import ELBOW, Searches
+
+_BAD, _GOOD = np.linspace(8.0, 12.0, 8), np.linspace(1.0, 1.2, 8)
+_TORQUE = 0.3
+
+
+def _pulled(row: Row) -> None:
+    BIAS.enter(row, "elbow", np.array([_TORQUE]))
+
+
+def _push(trajectory: str) -> Unexplained:
+    return Unexplained(
+        where="elbow", trajectory=trajectory, begin=0.5, end=0.6, phase="once", size=0.01,
+        unit="rad", times_noise=9.0, is_external=True,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def searches(tmp_path_factory: pytest.TempPathFactory) -> Searches:
+    return Searches(tmp_path_factory.mktemp("data"), seconds=4.0, enter=_pulled)
+
+
+def _found(searches: Searches) -> Search:
+    """Return a search that took the elbow's torque, fitted to ``first`` and ``again``."""
+    space = Space(searches.problem, (ELBOW,))
+    fit = polish(space, np.zeros(space.size), searches.problem.of("train"), 4)
+    tried = replace(searches.tried(ELBOW, _BAD, _GOOD), fit=fit)
+    return searches.search(_BAD, tried)
+
+
+def test_sizes_are_told_from_all_recordings_and_held_out_figures_are_not(searches: Searches):
+    found = _found(searches)
+    before = conclude(found, ())
+    fit_to_all(found, ())
+    assert found.final is not None
+    assert found.fitted_to == (*searches.problem.of("train"), *searches.problem.of("test"))
+    after = conclude(found, ())
+    assert after.held_out == before.held_out
+    (one,), (other,) = before.causes, after.causes
+    assert (one.effect, one.where) == (other.effect, other.where) == ("torque_bias", "elbow")
+    assert abs(other.value - _TORQUE) < 0.02
+    assert one.value != other.value
+    narrower = (other.interval.high - other.interval.low) / (one.interval.high - one.interval.low)
+    assert 0.3 < narrower < 1.0
+    told = {each.name: each.extended for each in after.base}
+    final = dict(zip(told, found.final.z, strict=False))
+    for each in searches.problem.parameters:
+        assert told[each.name] == pytest.approx(each.value(float(final[each.name])))
+
+
+def test_recordings_in_which_something_pushed_have_no_say(searches: Searches):
+    found = _found(searches)
+    fit_to_all(found, (_push("second"),))
+    assert found.final is None
+    assert found.told == (found.current, searches.problem.of("train"))
+    fit_to_all(found, (_push("first"),))
+    assert found.final is not None
+
+
+def test_blocks_that_do_not_count_keep_their_recording_out(searches: Searches):
+    found = _found(searches)
+    (segment,) = searches.problem.of("test")
+    rows = searches.problem.shape_of(segment)[0]
+    uncounted = {segment: np.zeros(rows, np.bool_)}
+    found.problem = replace(searches.problem, uncounted=uncounted)
+    fit_to_all(found, ())
+    assert found.final is None
+
+
+def test_a_base_by_itself_is_not_fitted_again(searches: Searches):
+    found = searches.search(_GOOD)
+    fit_to_all(found, ())
+    assert found.final is None
