@@ -30,6 +30,9 @@ _STANDS_OUT = 8.0
 """Mean square residual of a stretch over the usual one, where something happened once."""
 _TAKEN_AWAY = 0.4
 """Share of it that may be left by what explains it."""
+_EVENT = 4.0
+"""Times the mean square residual of the usual stretch that one counts with at most, between causes:
+what happened once would be most of the mean, and most of its error."""
 _NEARLY = 0.05
 """Of the cost on what was fitted to: by so much two causes that hardly differ may be apart."""
 
@@ -199,15 +202,18 @@ def _sure(useful: list[Tried], train: tuple[int, ...]) -> list[Tried]:
 def _simplest(useful: list[Tried], rng: np.random.Generator) -> tuple[Tried, tuple[Tried, ...]]:
     """Return the cause to take, and those that are not told from it.
 
-    Each has passed by what was held out; which of them does best, all recordings say. Of what does
-    as well as the best one, the simplest is taken; what needs more numbers to do no better is no
+    Each has passed by what was held out; which of them does best, all recordings say. A stretch in
+    which something large happened has no more of a say than ``_EVENT`` usual ones. Of what does as
+    well as the best one, the simplest is taken; what needs more numbers to do no better is no
     rival, unless it is in the nature of both that they are hardly told apart.
     """
-    best = min(useful, key=_left)
-    alike = [one for one in useful if one is best or _is_alike(best, one, rng)]
+    most = _EVENT * min(float(np.median(one.everywhere)) for one in useful)
+    left = {one.candidate: np.minimum(one.everywhere, most) for one in useful}
+    best = min(useful, key=lambda one: left[one.candidate].mean())
+    alike = [one for one in useful if one is best or _is_alike(best, one, left, rng)]
     fewest = min(one.numbers for one in alike)
     simple = [one for one in alike if one.numbers == fewest]
-    taken = min(simple, key=_left)
+    taken = min(simple, key=lambda one: left[one.candidate].mean())
     near = [one for one in useful if _is_nearly(taken, one, rng)]
     return taken, tuple(one for one in [*simple, *near] if one is not taken)
 
@@ -223,13 +229,11 @@ def _is_nearly(taken: Tried, other: Tried, rng: np.random.Generator) -> bool:
     return margin.gain < margin.error and other.fit.cost <= (1 + _NEARLY) * taken.fit.cost
 
 
-def _left(one: Tried) -> float:
-    return float(one.everywhere.mean())
-
-
-def _is_alike(best: Tried, other: Tried, rng: np.random.Generator) -> bool:
+def _is_alike(
+    best: Tried, other: Tried, left: dict[Candidate, Float64], rng: np.random.Generator
+) -> bool:
     """Return whether the recordings do not prefer the best surely."""
-    margin = compare(other.everywhere, best.everywhere, rng)
+    margin = compare(left[other.candidate], left[best.candidate], rng)
     return margin.gain < max(margin.error, ALIKE * best.gain.gain)
 
 

@@ -75,6 +75,16 @@ def test_which_cause_does_best_is_judged_by_all_recordings(searches: Searches):
     assert _simplest(list(both), rng)[0] is both[1]
 
 
+def test_what_happened_once_has_no_large_say_in_which_cause_does_best(searches: Searches):
+    rng = np.random.default_rng(0)
+    fitted = 1.0 + 0.1 * rng.normal(size=24)
+    event = np.where(np.arange(24) == 7, 90.0, 0.0)
+    right = replace(searches.tried(ELBOW, _BAD, _GOOD), fitted=fitted + event)
+    wrong = replace(searches.tried(LIFT, _BAD, _GOOD + 0.3), fitted=fitted + 0.2 + 0.8 * event)
+    assert wrong.everywhere.mean() < right.everywhere.mean()
+    assert _simplest([wrong, right], rng) == (right, ())
+
+
 def test_a_cause_that_may_as_well_be_nothing_is_taken_only_if_all_may(searches: Searches):
     train = searches.problem.of("train")
 
