@@ -16,18 +16,27 @@ from shared.identification.space import Space
 def prune(found: Search, train: tuple[int, ...], test: tuple[int, ...]) -> None:
     """Take back causes that may as well be nothing, and those without which the rest does as well.
 
-    How much of a cause there is, the recordings that were fitted to say; held-out ones say of what
-    use it is. Where others can make up for it, any size is of use.
+    Held-out recordings say of what use a cause is; where others can make up for it, any size is.
+    Whether there is any of it, those that were fitted to say, or else all together.
     """
     base = float(found.base_losses.mean())
     for each in _doubtful(found.accepted)[::-1]:
         is_told = not found.rivals[found.accepted.index(each)]
-        if is_told and not is_there(found.current, each.candidate, train):
+        if is_told and not _is_there(found.current, each.candidate, train, test):
             _take_back(found, each, _without(found, each, train, test))
     for each in _doubtful(found.accepted[:-1]):
         without = _without(found, each, train, test)
         if not judged(found, each.candidate, without, so_far(found)).gain.is_useful(base):
             _take_back(found, each, without)
+
+
+def _is_there(
+    fit: Fit, candidate: Candidate, train: tuple[int, ...], test: tuple[int, ...]
+) -> bool:
+    if is_there(fit, candidate, train):
+        return True
+    everything = (*train, *test)
+    return is_there(polish(fit.space, fit.z, everything, 2), candidate, everything)
 
 
 def _doubtful(accepted: list[Tried]) -> list[Tried]:

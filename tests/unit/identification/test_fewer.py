@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shared.identification.catalogue.joint_spring import EFFECT as JOINT_SPRING
-from shared.identification.certainty import half_widths
+from shared.identification.certainty import half_widths, is_there
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
 from shared.identification.fewer import one_for_many, prune
@@ -68,3 +68,20 @@ def test_a_cause_that_may_as_well_be_nothing_is_taken_back(searches: Searches, w
         assert not found.accepted
         assert found.current is found.base
         assert found.current_losses is found.base_losses
+
+
+def test_a_cause_that_is_surely_there_only_by_all_recordings_together_stays(tmp_path: Path):
+    def pull(row: Row) -> None:
+        ELBOW.effect.enter(row, ELBOW.place, np.array([0.3]))
+
+    searches = Searches(tmp_path, seconds=4.0, enter=pull)
+    elbow = searches.tried(ELBOW, np.full(8, 10.0), np.linspace(1.0, 1.2, 8))
+    found = searches.search(np.full(8, 10.0), elbow)
+    train, test = found.problem.of("train"), found.problem.of("test")
+    fit = polish(elbow.fit.space, elbow.fit.z, train, 4)
+    doubtful = fit.z.copy()
+    doubtful[-1] = 0.5 * half_widths(fit, train)[-1]
+    found.current = replace(fit, z=doubtful)
+    assert not is_there(found.current, ELBOW, train)
+    prune(found, train, test)
+    assert [each.candidate for each in found.accepted] == [ELBOW]
