@@ -15,7 +15,7 @@ def causes_of(found: Search, widths: Float64) -> tuple[Cause, ...]:
         found: the search, over.
         widths: float64[n], half of the 95 % interval of each coordinate of the final fit.
     """
-    final, _ = found.told
+    final = found.told
     begin = final.space.base_size
     base = float(found.base_losses.mean())
     sizes: dict[Candidate, tuple[Float64, Float64]] = {}

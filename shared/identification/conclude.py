@@ -48,7 +48,9 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
         left: what the extended model does not explain.
     """
     held_out = _held_out(found)
-    widths = half_widths(*found.told)
+    widths = half_widths(found.current, found.problem.of("train"))
+    if found.final is not None:  # what is no noise does not shrink with more recordings
+        widths = np.maximum(widths, half_widths(found.final, found.fitted_to))
     accepted = causes_of(found, widths)
     ties = ties_of(found, accepted) or ties_with_base(found)
     word = _word(found, ties, left)
@@ -180,7 +182,7 @@ def _why_not(
 
 
 def _base(found: Search, widths: Float64) -> tuple[BaseValue, ...]:
-    first, final = found.base, found.told[0]
+    first, final = found.base, found.told
     out: list[BaseValue] = []
     for index, each in enumerate(found.problem.parameters):
         z, half = float(final.z[index]), float(widths[index])

@@ -105,11 +105,9 @@ class Search:
     """Segments of the final fit."""
 
     @property
-    def told(self) -> tuple[Fit, tuple[int, ...]]:
-        """Return the fit that sizes are told from, and what it was fitted to."""
-        if self.final is None:
-            return self.current, self.problem.of("train")
-        return self.final, self.fitted_to
+    def told(self) -> Fit:
+        """Return the fit that sizes are told from."""
+        return self.current if self.final is None else self.final
 
 
 def is_open(found: Search) -> bool:

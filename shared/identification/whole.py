@@ -10,8 +10,8 @@ from shared.identification.fit import polish
 from shared.identification.searched import Search
 from shared.identification.verdict import Unexplained
 
-_STEPS = 2
-"""The most derivatives after the first: it begins where three in five of the recordings lead."""
+_STEPS = 1
+"""Derivatives after the first: it begins where three in five of the recordings lead."""
 
 
 def fit_to_all(found: Search, left: Sequence[Unexplained]) -> None:
