@@ -58,14 +58,14 @@ def is_there(fit: Fit, candidate: Candidate, segments: tuple[int, ...]) -> bool:
 def _that_do_something(fit: Fit, candidate: Candidate, segments: tuple[int, ...]) -> list[int]:
     """Return which numbers of a cause but the first change anything by themselves."""
     own = fit.space.where(candidate)
-    first, size = own.start, own.stop - own.start
+    size = own.stop - own.start
     alone = np.tile(fit.z, (size, 1))
     alone[:, own] = np.diag(fit.z[own])
     variants = [fit.space.variant(z) for z in alone]
     kept = tuple(each for each in variants[0].extras if each[0] != candidate)
     found = fit.space.problem.vector([*variants, replace(variants[0], extras=kept)], segments)
     changed = np.abs(found[:-1] - found[-1]).max(axis=1) > _NOTHING
-    return [index for index in range(1, size) if changed[index] and fit.z[first + index]]
+    return [index for index in range(1, size) if changed[index]]
 
 
 def _is_sure(z: Float64, covariance: Float64, which: Integers, free: int) -> bool:

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from services.jobs.identify import pictures, words
 from services.jobs.identify.pictures import Picture
 from shared.identification.evidence import Evidence
-from shared.identification.sentence import as_told
 from shared.identification.verdict import Scored, Tie, Verdict
 from shared.telemetry import html
 from shared.telemetry.html import Html, Node, tag
@@ -32,7 +31,7 @@ def _tie(tie: Tie) -> Node:
         (
             tag("b", cause.title),
             words.where_text(cause.where),
-            f"{as_told(cause).quantity} {words.size_text(cause)}",
+            words.size_text(cause),
             cause.signature,
         )
         for cause in tie.causes

@@ -19,7 +19,8 @@ BENT = (
 
 WHOLE = (
     "Which causes there are was judged on motion that nothing was fitted to, and what is told of "
-    "held-out motion is of that fit. How large they are is told from a last fit to all recordings."
+    "held-out motion is of that fit. How large they are is told from a last fit to all recordings "
+    "but held-out ones in which something pushed the arm."
 )
 
 
@@ -135,12 +136,13 @@ def _causes(verdict: Verdict, evidence: Evidence) -> Html | None:
 
 
 def _cause(cause: Cause) -> Html:
+    told = as_told(cause)
     rows: list[tuple[Node, Node]] = [
         ("effect", tag("code", cause.effect)),
         ("where", words.where_text(cause.where)),
         (
-            f"{as_told(cause).quantity} (95 %)",
-            tag("b", words.size_text(cause)),
+            f"{told.quantity} (95 %)",
+            tag("b", words.quantity_text(told.value, told.unit, told.interval)),
         ),
         *((name, words.number_text(value)) for name, value in cause.others.items()),
         ("explains by itself", words.share_text(cause.share, cause.share_interval)),

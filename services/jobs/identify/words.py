@@ -69,13 +69,13 @@ def where_text(where: str) -> str:
 def cause_text(cause: Cause) -> str:
     """Return a cause in a line: what, where, how large, how sure."""
     where = f" at {cause.where}" if cause.where else ""
-    return f"{cause.title}{where}: {as_told(cause).quantity} {size_text(cause)}"
+    return f"{cause.title}{where}: {size_text(cause)}"
 
 
 def size_text(cause: Cause) -> str:
-    """Return how large a cause is, with its 95 % interval."""
+    """Return what says how large a cause is, with its 95 % interval: ``delay 30 ms (29 to 31)``."""
     told = as_told(cause)
-    return quantity_text(told.value, told.unit, told.interval)
+    return f"{told.quantity} {quantity_text(told.value, told.unit, told.interval)}"
 
 
 def share_text(share: float, interval: Interval | None = None) -> str:

@@ -217,10 +217,10 @@ def _excitation(trajectories: Sequence[Trajectory], joints: Sequence[str]) -> li
     """Return ``little_excitation`` and ``faster_test``."""
     found: list[Caveat] = []
     train = [each for each in trajectories if each.split == "train"]
+    held_out = [each for each in trajectories if each.split == "test"]
     for index, joint in enumerate(joints):
         span = max(float(np.ptp(each.q[:, index])) for each in train)
         speed = max(_speed(each, index) for each in train)
-        held_out = [each for each in trajectories if each.split == "test"]
         fastest = max(held_out, key=lambda each: _speed(each, index))
         if _speed(fastest, index) > FASTER * max(speed, LEAST_SPEED):
             found.append(Caveat("faster_test", fastest.name, (
