@@ -1,7 +1,9 @@
 """The noise floor: how far two recordings of the same commands differ.
 
 Half the mean square of the difference of repeats, of the block means that residuals are made of.
-It has everything that a model cannot know: sensors, and whatever pushes the arm at random.
+It has everything that a model cannot know: sensors, and whatever pushes the arm at random. It is
+never less than what an encoder's steps hide: of a joint at rest two recordings may say the same
+to the last digit.
 """
 
 from dataclasses import dataclass, replace
@@ -9,6 +11,7 @@ from functools import cache
 
 import numpy as np
 
+from shared.identification.dataset.resolution import steps_of
 from shared.identification.dataset.types import Dataset, Float64, Trajectory
 from shared.identification.pushed import Pushed, pushed_of, whitening
 from shared.identification.smoothing import smooth
@@ -22,6 +25,8 @@ _STRETCH = 25
 """Blocks whose power is looked at together."""
 _FEWEST = 10
 """Readings that two recordings have to share, else the last of the shorter one is held."""
+_ROUND = np.sqrt(12.0)
+"""A step, in standard deviations of what rounding to it does."""
 _SAMPLES = 200
 """Of simulated noise, to learn what leaving out the noisiest stretches takes off."""
 
@@ -97,6 +102,7 @@ def noise_of(
         ]
         scale = 1.0
     of_joints, joint_correlation = _floor(joints, scale)
+    of_joints = np.maximum(of_joints, steps_of([each.q for each in dataset.trajectories]) / _ROUND)
     of_tracker, correlation = None, joint_correlation
     if dataset.has_tracker and tracker:
         of_tracker, tracker_correlation = _floor(tracker, scale)

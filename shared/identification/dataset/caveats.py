@@ -8,6 +8,7 @@ import numpy as np
 
 from shared.identification.dataset.beginnings import LEAST, first_velocities
 from shared.identification.dataset.checks import is_resolved, velocity_ratio
+from shared.identification.dataset.resolution import step_of
 from shared.identification.dataset.types import Caveat, Control, Float64, Trajectory
 
 GAP_PERIODS: Final = 5.0
@@ -150,11 +151,10 @@ def of_joints(trajectory: Trajectory, joints: Sequence[str]) -> list[Caveat]:
                 f"joint {joint!r} goes at {speed:.3g} rad/s (m/s) by its positions: are they in "
                 "degrees or mm, or noisy?"
             )))  # fmt: skip
-        levels = np.unique(q[:, index])
-        step = float(np.diff(levels).min()) if len(levels) > 2 else 0.0
-        if step > COARSE:
+        if (step := step_of(q[:, index])) > COARSE:
+            values = len(np.unique(q[:, index]))
             found.append(Caveat("quantised", name, (
-                f"joint {joint!r} is read in steps of {step:.3g} rad (m), {len(levels)} values in "
+                f"joint {joint!r} is read in steps of {step:.3g} rad (m), {values} values in "
                 "all: nothing smaller is seen"
             )))  # fmt: skip
         if trajectory.qd is not None:

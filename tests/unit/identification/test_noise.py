@@ -87,3 +87,14 @@ def test_block_means_are_those_by_hand_and_a_block_without_a_reading_is_left_out
     values = np.array([[1.0], [3.0], [5.0], [9.0], [4.0]])
     assert block_means(at, values, 0.02).tolist() == [[2.0], [7.0], [4.0]]
     assert block_means(at, values[:3], 0.02).tolist() == [[2.0], [5.0]]
+
+
+def test_a_floor_is_never_under_what_an_encoders_steps_hide():
+    rng = np.random.default_rng(6)
+    held = np.repeat(rng.integers(-3, 4, (20, 2)), 20, axis=0) * 0.01
+    found = noise_of(repeated(held, held), 0.02, {})
+    assert found.joints.max() < 0.01  # the sine that was added has no steps
+    still = replace(repeated(held, held), trajectories=tuple(
+        replace(each, q=held) for each in repeated(held, held).trajectories
+    ))  # fmt: skip
+    assert noise_of(still, 0.02, {}).joints == pytest.approx(0.01 / np.sqrt(12.0))
