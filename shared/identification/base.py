@@ -20,6 +20,8 @@ INERTIA_PRIOR = 0.1
 """Standard deviation of what is known of a link's mass and inertia (1)."""
 _LOOSE = 1.5
 """Of damping, armature and gains: a factor of 4.5 either way is unlikely."""
+_MOST_FRICTION = 30.0
+"""Times what the model file says: of small servos it is often ten (an SO-101's wear 0.4 N m)."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ def base_parameters(subject: Subject) -> tuple[BaseParameter, ...]:
                     is_factor=False,
                     scale=friction,
                     low=-nominal / friction,
-                    high=5.0,
+                    high=_MOST_FRICTION if nominal > 0.0 else 5.0,
                     prior=_LOOSE,
                     change=_setter("dof_frictionloss", joint),
                 )

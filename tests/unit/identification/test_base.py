@@ -36,9 +36,10 @@ def test_nought_is_nominal_and_one_a_factor_e_or_the_scale(subject: Subject):
         assert each.value(each.low) >= 0.0
 
 
-def test_frictions_low_bound_is_no_friction_at_all(subject: Subject):
+def test_frictions_bounds_are_none_at_all_and_far_more_than_the_file_says(subject: Subject):
     found = [each for each in base_parameters(subject) if each.name.startswith("friction_loss")]
     assert [each.value(each.low) for each in found] == [0.0, 0.0, 0.0]
+    assert all(each.value(each.high) > 20.0 * each.nominal for each in found)
     assert [each.nominal for each in found] == pytest.approx([0.1, 0.1, 0.05])
 
 
