@@ -6,7 +6,7 @@ import numpy as np
 
 from shared.identification.bent import ties_with_base
 from shared.identification.causes import causes_of, ties_of
-from shared.identification.certainty import half_widths
+from shared.identification.certainty import half_widths, is_there
 from shared.identification.dataset.types import Float64
 from shared.identification.gate import compare, floor_of
 from shared.identification.problem import Variant
@@ -48,9 +48,7 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
         left: what the extended model does not explain.
     """
     held_out = _held_out(found)
-    widths = half_widths(found.current, found.problem.of("train"))
-    if found.final is not None:  # what is no noise does not shrink with more recordings
-        widths = np.maximum(widths, half_widths(found.final, found.fitted_to))
+    widths = _widths(found)
     accepted = causes_of(found, widths)
     ties = ties_of(found, accepted) or ties_with_base(found)
     word = _word(found, ties, left)
@@ -65,6 +63,25 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
         candidates=_scored(found, word),
         base=_base(found, widths),
     )
+
+
+def _widths(found: Search) -> Float64:
+    """Return float64[n], half widths of the coordinates' intervals.
+
+    What is no noise does not shrink with more recordings, so the wider one of two fits is told;
+    but of a cause that only all recordings together show, what they say.
+    """
+    train = found.problem.of("train")
+    first = half_widths(found.current, train)
+    if found.final is None:
+        return first
+    last = half_widths(found.final, found.fitted_to)
+    widths = np.maximum(first, last)
+    for each in found.accepted:
+        if not is_there(found.current, each.candidate, train):
+            where = found.current.space.where(each.candidate)
+            widths[where] = last[where]
+    return widths
 
 
 def extended(found: Search) -> Variant:

@@ -63,6 +63,18 @@ def test_sizes_are_told_from_all_recordings_and_held_out_figures_are_not(searche
         assert told[each.name] == pytest.approx(each.value(float(final[each.name])))
 
 
+def test_the_interval_of_a_cause_that_only_all_recordings_show_is_theirs(searches: Searches):
+    found = _found(searches)
+    jacobian = found.current.jacobian.copy()
+    jacobian[:, found.current.space.where(ELBOW)] *= 1e-3
+    found.current = replace(found.current, jacobian=jacobian)
+    (alone,) = conclude(found, ()).causes
+    assert alone.interval.low < 0.0 < alone.interval.high
+    fit_to_all(found, ())
+    (together,) = conclude(found, ()).causes
+    assert 0.0 < together.interval.low < _TORQUE < together.interval.high
+
+
 def test_recordings_in_which_something_pushed_have_no_say(searches: Searches):
     found = _found(searches)
     fit_to_all(found, (_push("second"),))
