@@ -21,7 +21,7 @@ INERTIA_PRIOR = 0.1
 _LOOSE = 1.5
 """Of damping, armature and gains: a factor of 4.5 either way is unlikely."""
 _MOST_FRICTION = 30.0
-"""Times what the model file says: of small servos it is often ten (an SO-101's wear 0.4 N m)."""
+"""Beyond what the model file says, in units of it: small servos rub with ten times that."""
 
 
 @dataclass(frozen=True)

@@ -92,9 +92,7 @@ def test_block_means_are_those_by_hand_and_a_block_without_a_reading_is_left_out
 def test_a_floor_is_never_under_what_an_encoders_steps_hide():
     rng = np.random.default_rng(6)
     held = np.repeat(rng.integers(-3, 4, (20, 2)), 20, axis=0) * 0.01
-    found = noise_of(repeated(held, held), 0.02, {})
-    assert found.joints.max() < 0.01  # the sine that was added has no steps
-    still = replace(repeated(held, held), trajectories=tuple(
-        replace(each, q=held) for each in repeated(held, held).trajectories
-    ))  # fmt: skip
+    swung = repeated(held, held)
+    assert noise_of(swung, 0.02, {}).joints.max() < 0.01  # the sine that was added has no steps
+    still = replace(swung, trajectories=tuple(replace(each, q=held) for each in swung.trajectories))
     assert noise_of(still, 0.02, {}).joints == pytest.approx(0.01 / np.sqrt(12.0))
