@@ -31,21 +31,22 @@ class About(NamedTuple):
     """Times as long, or as short, as it may be."""
     phases: int
     """Of a turn, that are tried first."""
+    closer: int
+    """Times that steps are halved once all of the recordings are looked at."""
 
 
-WIDE = About(1.6, 8)
+WIDE = About(1.6, 8, 2)
 """Where only the screen has seen it."""
-LIKELY = About(1.12, 8)
-"""Where it makes the delay that fits best."""
-NEAR = About(1.005, 32)
-"""Where the base was fitted with it."""
-_FEWEST, _MOST = 5, 128
+LIKELY = About(1.25, 8, 2)
+"""Where it makes the delay that fits best: half of it, and what the base makes up for."""
+NEAR = About(1.005, 32, 5)
+"""Where the base was fitted with it. Which command a turn takes jumps, so of a hundred turns the
+one that is nearest to a command must be right to a hundredth of their interval."""
+_FEWEST, _MOST = 5, 256
 """Intervals tried first. Where it would take more, turns come so often that only their mean shows,
 and that is smooth."""
 _KEPT = 6
 """Best ones that are looked at more closely."""
-_CLOSER = 2
-"""Times that steps are halved once all of the recordings are looked at."""
 _AROUND = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Steps about what was kept."""
 
@@ -133,7 +134,7 @@ def aligned(
         picked = tuple(segment for segment in segments if parts[segment].begin < reach)
         vectors = [space.clip(turning.at(z, *each)) for each in tries]
         costs = cost(vectors, picked)
-        if reach >= last and closer == _CLOSER:
+        if reach >= last and closer == about.closer:
             found = vectors[int(np.argmin(costs))]
             return found if costs.min() < cost([z], picked)[0] else z
         closer += reach >= last
