@@ -166,7 +166,7 @@ def floor_from_base(space: Space) -> Noise:
     How far below that a right model would come is not known, so causes are judged only by how
     much better they are, not by what they leave.
     """
-    parts = Space(space.problem.in_parts(WINDOW), space.candidates)
+    parts = _on_parts(space)
     pieces = parts.problem.of("train")
     fit = polish(parts, np.zeros(space.size), pieces, 4)
     problem, noise = parts.problem, parts.problem.noise
@@ -191,7 +191,7 @@ class SavedFits:
 def fit_again(space: Space, saved: SavedFits) -> BaseFits:
     """Return a base fit that was found before."""
     problem = space.problem
-    parts = Space(problem.in_parts(WINDOW), space.candidates)
+    parts = _on_parts(space)
     origin, pieces = np.zeros(space.size), parts.problem.of("train")
     nominal = Start(origin, parts.jacobian(origin, pieces)[1])
     begun = Fit.at(parts, np.array(saved.parts), pieces)
@@ -231,44 +231,40 @@ def fit_without(space: Space, done: BaseFits, doubted: Sequence[int]) -> BaseFit
         doubted: which of its coordinates they were.
     """
     begun, best = (np.delete(fit.z, doubted) for fit in (done.parts, done.whole))
-    return fit_from(space, begun, best, starts_agree=done.whole.starts_agree)
+    parts = _on_parts(space)
+    near = polish(parts, begun, parts.problem.of("train"), 6)
+    is_same = parts.problem is space.problem
+    whole = near if is_same else polish(space, best, space.problem.of("train"), 6)
+    nominal = _start_without(done.nominal, doubted)
+    return BaseFits(nominal, near, replace(whole, starts_agree=done.whole.starts_agree))
 
 
-def fit_from(space: Space, begun: Float64, best: Float64, *, starts_agree: bool) -> BaseFits:
-    """Return the base's fit from where one like it came to.
-
-    Args:
-        space: where.
-        begun: float64[n], the other's best on short parts.
-        best: float64[n], on whole recordings.
-        starts_agree: whether its starts did.
-    """
-    nominal, parts = _on_parts(space, begun)
-    is_same = parts.space.problem is space.problem
-    whole = parts if is_same else polish(space, best, space.problem.of("train"), 6)
-    return BaseFits(nominal, parts, replace(whole, starts_agree=starts_agree))
+def _start_without(start: Start, gone: Sequence[int]) -> Start:
+    """Return the derivative at a vector in which some coordinates are 0, without those."""
+    priors = [len(start.jacobian) - start.z.size + index for index in gone]
+    kept = np.delete(np.delete(start.jacobian, gone, axis=1), priors, axis=0)
+    return Start(np.delete(start.z, gone), kept)
 
 
 def _fitted(space: Space, searched: Float64) -> BaseFits:
     """Return the better one of two fits: from nominal by way of short parts, and directly."""
     problem = space.problem
     segments = problem.of("train")
-    nominal, begun = _on_parts(space, np.zeros(space.size))
-    is_same = begun.space.problem is problem
+    parts, origin = _on_parts(space), np.zeros(space.size)
+    pieces = parts.problem.of("train")
+    at_nominal = parts.jacobian(origin, pieces)
+    begun = polish(parts, origin, pieces, 6, known=at_nominal)
+    is_same = parts.problem is problem
     fits = [
         begun if is_same else polish(space, begun.z, segments, 6),
         polish(space, searched, segments, 6),
     ]
     best = min(fits, key=lambda fit: fit.cost)
     agree = max(fit.cost for fit in fits) <= best.cost * (1 + AGREE) + 1.0
+    nominal = Start(origin, at_nominal[1])
     return BaseFits(nominal, best if is_same else begun, replace(best, starts_agree=agree))
 
 
-def _on_parts(space: Space, near: Float64) -> tuple[Start, Fit]:
-    """Return the derivative at the nominal model, and the fit from ``near``, on short parts."""
-    parts = Space(space.problem.in_parts(WINDOW), space.candidates)
-    origin, pieces = np.zeros(space.size), parts.problem.of("train")
-    residual, jacobian = parts.jacobian(origin, pieces)
-    known = None if near.any() else (residual, jacobian)
-    begun = polish(parts, near, pieces, 6, known=known)
-    return Start(origin, jacobian), begun
+def _on_parts(space: Space) -> Space:
+    """Return the same on short parts, unless recordings come in such already."""
+    return Space(space.problem.in_parts(WINDOW), space.candidates)

@@ -9,7 +9,7 @@ import pytest
 from shared.identification.base import base_parameters, enter_base
 from shared.identification.cmaes import minimize
 from shared.identification.dataset.types import Dataset
-from shared.identification.fit import polish
+from shared.identification.fit import BaseFits, Start, fit_without, polish
 from shared.identification.noise import Noise
 from shared.identification.problem import Problem
 from shared.identification.space import Space
@@ -73,3 +73,19 @@ def test_cmaes_finds_the_bottom_of_a_bowl_within_bounds():
 def test_nothing_to_search_is_found_at_once():
     empty = np.zeros(0)
     assert minimize(lambda zs: zs.sum(axis=1), empty, empty, empty, sigma=0.3, seed=1).size == 0
+
+
+def test_what_is_taken_out_of_a_base_is_taken_out_of_the_derivative_at_the_nominal_model(
+    tmp_path: Path,
+):
+    problem = planted(tmp_path)
+    gone = [1, 3]
+    kept = tuple(each for index, each in enumerate(problem.parameters) if index not in gone)
+    full, space = Space(problem), Space(replace(problem, parameters=kept))
+    whole = polish(full, np.zeros(full.size), problem.of("train"), 1)
+    at_nominal = Start(np.zeros(full.size), full.jacobian(np.zeros(full.size), (0,))[1])
+    found = fit_without(space, BaseFits(at_nominal, whole, whole), gone)
+    _, wanted = space.jacobian(np.zeros(space.size), (0,))
+    assert found.nominal.jacobian == pytest.approx(wanted)
+    assert found.nominal.z == pytest.approx(np.zeros(space.size))
+    assert found.whole.cost > whole.cost
