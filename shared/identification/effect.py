@@ -12,6 +12,8 @@ Side = Literal["command", "plant", "joints", "tracker"]
 """Whether a cause changes what reaches the controller, how the arm moves, or what is logged."""
 ONCE = "external_contact"
 """The effect that is in one recording, for a while."""
+IN_RECORDING = " in "
+"""Between the joint and the recording in the name of its place."""
 
 
 @dataclass(frozen=True)
@@ -78,3 +80,8 @@ class Candidate:
     def label(self) -> str:
         """Return its name for people and for programs: ``coulomb_friction elbow_flex``."""
         return f"{self.effect.name} {self.place}".strip()
+
+    @property
+    def recording(self) -> str | None:
+        """Return the name of the one recording that it is in, None if it may be in any."""
+        return self.place.split(IN_RECORDING, 1)[1] if self.effect.name == ONCE else None

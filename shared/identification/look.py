@@ -26,6 +26,8 @@ _SLIGHT = 0.015
 """Of the training residual: what explains less at first sight is not refitted."""
 _SLIGHT_BESIDE = 0.1
 """The same, as a share of what the best one explains."""
+_ONCE_BESIDE = 0.3
+"""The same of what happened once: a law that the model lacks looks like pushes where it is most."""
 
 
 def look(
@@ -51,7 +53,7 @@ def look(
         new = [
             each
             for each in _diverse(screen(far, candidates, segments))
-            if each.candidate not in known
+            if each.candidate not in known and each.candidate.recording is None
         ]
         picked += [(each, far) for each in new[:_MORE]]
     found: list[Rough] = []
@@ -82,15 +84,17 @@ def _of_turns(
 
 
 def _diverse(screened: Sequence[Screened]) -> list[Screened]:
-    """Return the best few, not all of one effect."""
+    """Return the best few, not all of one effect; what happened once takes nobody's place."""
     counts: dict[str, int] = {}
     out: list[Screened] = []
+    lasting = 0
     for each in screened:
-        name = each.candidate.effect.name
+        name, is_once = each.candidate.effect.name, each.candidate.recording is not None
         counts[name] = counts.get(name, 0) + 1
-        is_slight = each.share < max(_SLIGHT, _SLIGHT_BESIDE * screened[0].share)
-        if counts[name] <= _PER_EFFECT and not is_slight:
-            out.append(each)
-        if len(out) == _TRIED:
-            break
+        beside = _ONCE_BESIDE if is_once else _SLIGHT_BESIDE
+        is_slight = each.share < max(_SLIGHT, beside * screened[0].share)
+        if counts[name] > _PER_EFFECT or is_slight or (lasting == _TRIED and not is_once):
+            continue
+        out.append(each)
+        lasting += not is_once
     return out

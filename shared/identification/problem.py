@@ -144,6 +144,13 @@ class Problem:
         """Return how many numbers of :meth:`vector` are a segment's."""
         return math.prod(self.shape_of(segment))
 
+    def rows_of(self, segments: Sequence[int], picked: Sequence[int]) -> NDArray[np.bool_]:
+        """Return bool[M]: which numbers of :meth:`vector` on segments are of those picked."""
+        wanted = set(picked)
+        return np.concatenate(
+            [np.full(self.size_of(segment), segment in wanted) for segment in segments]
+        )
+
     def vector(self, variants: Sequence[Variant], segments: Sequence[int]) -> Float64:
         """Return float64[V, M]: the residuals of each variant in one row."""
         return np.stack(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from shared.identification.dataset.types import Float64
 from shared.identification.fit import Fit, Start, damped, go_down
-from shared.identification.screen import Screened, rows_of
+from shared.identification.screen import Screened
 from shared.identification.space import Space
 from shared.identification.turns import LIKELY, NEAR, aligned, turning_of
 
@@ -59,7 +59,7 @@ def refit(
     quantities = screened.candidate.effect.quantities(problem.subject, screened.candidate.place)
     is_local = not all(quantity.is_smooth for quantity in quantities)
     picked = segments if is_local else segments[::_EVERY]
-    rows = rows_of(problem, segments, picked)
+    rows = problem.rows_of(segments, picked)
     extra = space.size - fit.space.size
     way: Float64 = np.concatenate([screened.shift, screened.start])
     origin: Float64 = np.concatenate([begun.z, np.zeros(extra)])

@@ -13,20 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.identification.dataset.types import Float64
-from shared.identification.effect import ONCE, Candidate, Effect, Quantity
+from shared.identification.effect import Candidate, Effect, Quantity
 from shared.identification.fit import Fit
 from shared.identification.linear import bounded, least_squares
-from shared.identification.problem import Problem, Variant
+from shared.identification.problem import Variant
 from shared.identification.subject import Subject
 
 GRID = (0.25, 0.5, 1.0, 2.0, 4.0)
 """Sizes, in probes, at which an effect that is not smooth is looked at."""
 _EVERY = 2
-"""One in so many parts shows what acts all the time, where it is plain."""
+"""One in so many parts shows what acts all the time well enough to be looked at closer, or not."""
 _MANY = 8
 """Parts, at least, of which some are left out."""
+_CLOSER = 16
+"""Candidates that are looked at in all parts after that, where it is not plain."""
 _PLAIN = 10.0
-"""Mean square residual, in noise floors, from which that will do: what is small takes all."""
+"""Mean square residual, in noise floors, from which it is: what is small takes all parts."""
 _NEAR = 2.0
 """An effect that acts from some size on is looked at where it does no more than twice too much."""
 
@@ -71,35 +73,41 @@ def screen(fit: Fit, candidates: Sequence[Candidate], segments: tuple[int, ...])
         fit: what is there so far, on the segments.
         candidates: what is looked for.
         segments: recordings, or parts of them. Of many, every second one has to do for what acts
-            all the time, if much is left.
+            all the time, but for the best of that unless much is left.
     """
-    is_plain = 2.0 * fit.cost > _PLAIN * len(fit.residual) and len(segments) >= _MANY
-    picked = segments[::_EVERY] if is_plain else segments
-    rows = rows_of(fit.space.problem, segments, picked)
+    picked = segments[::_EVERY] if len(segments) >= _MANY else segments
+    rows = fit.space.problem.rows_of(segments, picked)
     subject = fit.space.problem.subject
-    steady = [each for each in candidates if _is_steady(subject, each)]
-    local = [each for each in candidates if not _is_steady(subject, each)]
-    found = [
-        *_screened(_on(fit, rows), steady, picked, None),
-        *_screened(fit, local, segments, rows),
-    ]
-    return sorted(found, key=lambda each: -each.share)
+    once = [each for each in candidates if each.recording is not None]
+    steady = [each for each in candidates if each not in once and _is_steady(subject, each)]
+    local = [each for each in candidates if each not in once and each not in steady]
+    found = sorted(_screened(_on(fit, rows), steady, picked, None), key=_best_first)
+    is_plain = 2.0 * fit.cost > _PLAIN * len(fit.residual)
+    if len(picked) < len(segments) and not is_plain:
+        local += [each.candidate for each in found[:_CLOSER]]
+        del found[:_CLOSER]
+    found += _screened(fit, local, segments, rows)
+    for recording in dict.fromkeys(each.recording for each in once):
+        own = [each for each in once if each.recording == recording]
+        found += _screened(fit, own, segments, rows, _of_recording(fit, recording, segments))
+    return sorted(found, key=_best_first)
+
+
+def _of_recording(fit: Fit, name: str | None, segments: tuple[int, ...]) -> tuple[int, ...]:
+    """Return those of some segments that are of a recording."""
+    problem = fit.space.problem
+    names = [each.name for each in problem.dataset.trajectories]
+    return tuple(each for each in segments if names[problem.segments[each].trajectory] == name)
+
+
+def _best_first(screened: Screened) -> float:
+    return -screened.share
 
 
 def _is_steady(subject: Subject, candidate: Candidate) -> bool:
-    """Return whether a candidate acts in all recordings, and at any size."""
+    """Return whether a candidate acts at any size."""
     found = candidate.effect.quantities(subject, candidate.place)
-    return candidate.effect.name != ONCE and all(each.is_smooth for each in found)
-
-
-def rows_of(
-    problem: Problem, segments: tuple[int, ...], picked: tuple[int, ...]
-) -> NDArray[np.bool_]:
-    """Return which rows of a derivative on segments are of those picked."""
-    wanted = set(picked)
-    return np.concatenate(
-        [np.full(problem.size_of(segment), segment in wanted) for segment in segments]
-    )
+    return all(each.is_smooth for each in found)
 
 
 def _on(fit: Fit, rows: NDArray[np.bool_]) -> Fit:
@@ -110,9 +118,17 @@ def _on(fit: Fit, rows: NDArray[np.bool_]) -> Fit:
 
 def _screened(
     fit: Fit, candidates: Sequence[Candidate], segments: tuple[int, ...],
-    rows: NDArray[np.bool_] | None,
+    rows: NDArray[np.bool_] | None, acted: tuple[int, ...] | None = None,
 ) -> list[Screened]:  # fmt: skip
-    """Return every candidate at its best; signatures are of some rows only, if given."""
+    """Return every candidate at its best.
+
+    Args:
+        fit: what is there so far, on the segments.
+        candidates: what is looked for.
+        segments: of the fit.
+        rows: of which signatures are; all if None.
+        acted: segments in which the candidates can change anything; all if None.
+    """
     if not candidates:
         return []
     problem, base = fit.space.problem, fit.space.variant(fit.z)
@@ -129,7 +145,7 @@ def _screened(
             variants += [base.with_extra(candidate, values) for values in look.values]
             begun.append((look, slice(begin, len(variants))))
         looks.append(begun)
-    found = _signatures(fit, variants, segments)
+    found = _signatures(fit, variants, segments, segments if acted is None else acted)
     shown = slice(None) if rows is None else np.r_[rows, np.ones(fit.space.size, np.bool_)]
     out: list[Screened] = []
     for candidate, begun in zip(candidates, looks, strict=True):
@@ -184,12 +200,16 @@ def _looks(quantities: Sequence[Quantity]) -> list[_Look]:
     return out
 
 
-def _signatures(fit: Fit, variants: Sequence[Variant], segments: tuple[int, ...]) -> Float64:
+def _signatures(
+    fit: Fit, variants: Sequence[Variant], segments: tuple[int, ...], acted: tuple[int, ...]
+) -> Float64:
     """Return float64[V, M + n]: how the residual changes."""
-    problem, n = fit.space.problem, fit.space.size
-    found = problem.vector(variants, segments)
-    moved = found - fit.residual[: found.shape[1]]
-    return np.concatenate([moved, np.zeros((len(variants), n))], axis=1)
+    problem = fit.space.problem
+    moved = np.zeros((len(variants), len(fit.residual)))
+    if acted:
+        rows = np.flatnonzero(problem.rows_of(segments, acted))
+        moved[:, rows] = problem.vector(variants, acted) - fit.residual[rows]
+    return moved
 
 
 def _judge(

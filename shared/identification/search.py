@@ -26,7 +26,7 @@ _FAR = 2.0
 """Candidates whose rough refit costs so many times the best one's get no full fit."""
 QUIET = 1.25
 """Mean square residual, in noise floors, below which no further cause is looked for."""
-_STANDS_OUT = 8.0
+_STANDS_OUT = 6.0
 """Mean square residual of a stretch over the usual one, where something happened once."""
 _TAKEN_AWAY = 0.4
 """Share of it that may be left by what explains it."""

@@ -3,18 +3,16 @@
 import numpy as np
 
 from shared.identification.dataset.types import Float64
-from shared.identification.effect import Quantity, Side
+from shared.identification.effect import IN_RECORDING, Quantity, Side
 from shared.identification.places import place_of
 from shared.identification.subject import Subject
 from shared.sim.plant.row import Row, Step
 from shared.sim.plant.structure import Structure
 
-_LOOKS = 60
-"""Windows at all joints of all recordings together, about: each has to be simulated."""
-_MOST_WINDOWS = 12
+_WINDOW = 0.5
+"""Of the windows in which it is first looked for (s): much longer than a push, one hides it."""
+_MOST_WINDOWS = 40
 """Of one recording."""
-_IN = " in "
-"""Between the joint and the recording in the name of a place."""
 
 
 class _Push:
@@ -44,19 +42,18 @@ class ExternalContact:
     def places(self, subject: Subject) -> tuple[str, ...]:
         """Return every joint in every recording: ``elbow in swings``."""
         return tuple(
-            f"{joint}{_IN}{trajectory}"
+            f"{joint}{IN_RECORDING}{trajectory}"
             for trajectory in subject.trajectories
             for joint in subject.joints
         )
 
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
         """Return the torque and its window, looked for in windows that cover the recording."""
-        name, trajectory = place.split(_IN, 1)
+        name, trajectory = place.split(IN_RECORDING, 1)
         joint = place_of(subject, name)
         most = 20.0 * joint.drive
         until = _duration(subject, trajectory)
-        places = len(subject.joints) * len(subject.trajectories)
-        count = int(np.clip(_LOOKS // places, 2, _MOST_WINDOWS))
+        count = int(np.clip(round(until / _WINDOW), 2, _MOST_WINDOWS))
         length = until / count
         begins = tuple(float(begin) for begin in length * np.arange(count))
         return (
@@ -71,7 +68,7 @@ class ExternalContact:
 
     def enter(self, row: Row, place: str, values: Float64) -> None:
         """Push the joint, if this is the recording; instants are the recording's."""
-        joint, trajectory = place.split(_IN, 1)
+        joint, trajectory = place.split(IN_RECORDING, 1)
         torque, begin, length = (float(value) for value in values)
         if trajectory != row.trajectory or torque == 0.0 or length <= 0.0:
             return

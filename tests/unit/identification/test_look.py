@@ -5,6 +5,7 @@ import pytest
 
 from shared.identification.catalogue.asymmetric_friction import EFFECT as ASYMMETRIC
 from shared.identification.catalogue.command_latency import EFFECT as LATENCY
+from shared.identification.catalogue.external_contact import EFFECT as PUSH
 from shared.identification.catalogue.load_friction import EFFECT as LOAD
 from shared.identification.catalogue.sample_and_hold import EFFECT as HOLD
 from shared.identification.catalogue.torque_saturation import EFFECT as SATURATION
@@ -12,8 +13,12 @@ from shared.identification.effect import Candidate
 from shared.identification.fit import Fit, Start, polish
 from shared.identification.hidden.generator import simulated
 from shared.identification.hidden.recipe import Recipe, wish_of
-from shared.identification.look import look
+from shared.identification.look import (
+    _diverse,  # pyright: ignore[reportPrivateUsage]
+    look,
+)
 from shared.identification.progress import silent
+from shared.identification.screen import Screened
 from shared.identification.space import Space
 from shared.sim.plant.row import Row
 from tests.measured import measure, problem_of
@@ -68,3 +73,21 @@ def test_an_interval_that_looks_like_a_delay_of_half_of_it_is_told_from_it():
     assert rough[0].space.values(rough[0].z)[0][0] == pytest.approx(0.0243, rel=1e-3)
     assert rough[1].space.values(rough[1].z)[0][0] == pytest.approx(0.0122, rel=0.1)
     assert rough[0].ratio < 0.7 * rough[1].ratio
+
+
+@pytest.mark.parametrize(("push", "looked_at"), [(0.4, True), (0.1, False)])
+def test_what_happened_once_takes_nobodys_place(push: float, looked_at: bool):
+    def seen(candidate: Candidate, share: float) -> Screened:
+        return Screened(candidate, np.ones(1), np.zeros(0), share, np.zeros(0))
+
+    effects = (LOAD, ASYMMETRIC, SATURATION)
+    lasting = [
+        seen(Candidate(effect, place), 0.5 - 0.05 * index)
+        for index, (effect, place) in enumerate(
+            (effect, place) for place in ("lift", "elbow") for effect in effects
+        )
+    ]
+    once = [seen(Candidate(PUSH, f"{joint} in first"), push) for joint in ("lift", "elbow")]
+    found = _diverse(sorted([*lasting, *once], key=lambda each: -each.share))
+    assert [each for each in found if each not in once] == lasting
+    assert [each for each in found if each in once] == (once if looked_at else [])

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shared.identification.catalogue.external_contact import EFFECT as PUSH
 from shared.identification.catalogue.joint_spring import EFFECT as SPRING
 from shared.identification.catalogue.stribeck_friction import EFFECT as STRIBECK
 from shared.identification.catalogue.torque_bias import EFFECT as BIAS
@@ -14,6 +15,7 @@ from shared.identification.fit import polish
 from shared.identification.screen import Screened, screen
 from shared.identification.space import Space
 from shared.sim.plant.row import Row
+from tests.arms import JOINTS
 from tests.measured import measure, problem_of
 
 _EFFECTS = (SPRING, STRIBECK, BIAS, SATURATION)
@@ -60,3 +62,28 @@ def test_a_limit_is_looked_for_on_its_own_grid(tmp_path: Path) -> None:
     best, (inverse,) = screened(tmp_path, SATURATION, [0.8])
     assert best.candidate.label == "torque_saturation elbow"
     assert inverse == pytest.approx(0.8, rel=0.2)
+
+
+def test_a_push_is_looked_for_half_a_second_at_a_time_in_its_own_recording(tmp_path: Path) -> None:
+    def enter(row: Row) -> None:
+        PUSH.enter(row, "elbow in first", np.array([1.0, 2.1, 0.3]))
+
+    problem = problem_of(measure(tmp_path, np.random.default_rng(0), enter, seconds=4.0))
+    space, segments = Space(problem), problem.of("train")
+    fit = polish(space, np.zeros(space.size), segments, 2)
+    names = ("first", "again", "second")
+    candidates = [Candidate(PUSH, f"{joint} in {name}") for name in names for joint in JOINTS]
+    found = screen(fit, candidates, segments)
+    best = found[0]
+    assert best.candidate.label == "external_contact elbow in first"
+    torque, begin, length = (
+        start * each.probe
+        for start, each in zip(
+            best.start, PUSH.quantities(problem.subject, best.candidate.place), strict=True
+        )
+    )
+    assert torque == pytest.approx(1.0, rel=0.6)
+    assert (begin, length) == pytest.approx((2.0, 0.5), abs=0.01)
+    held_out = [each for each in found if each.candidate.place.endswith("in second")]
+    assert len(held_out) == 3
+    assert all(each.share == 0.0 for each in held_out)

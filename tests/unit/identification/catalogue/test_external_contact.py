@@ -20,9 +20,9 @@ def test_it_sits_at_every_joint_in_every_recording(subject: Subject):
     assert places[0] == "pan in slow"
     torque, begin, length = EFFECT.quantities(subject, "elbow in fast")
     assert torque.unit == "N m"
-    # 60 looks at 3 joints in 2 recordings: 10 windows that cover all of 10 s
-    assert begin.grid == pytest.approx(tuple(range(10)))
-    assert length.grid == (1.0,)
+    # windows of half a second that cover all of 10 s
+    assert begin.grid == pytest.approx(tuple(0.5 * index for index in range(20)))
+    assert length.grid == (0.5,)
 
 
 def test_a_push_turns_a_free_joint_by_hand(subject: Subject):
