@@ -84,7 +84,7 @@ def identify(
         found = untouched
         search(found, progress)
         clock.over("search")
-        left = _left(found)
+        left = _left(found, [each for each in left if each.is_external])
         clock.over("unexplained")
     if not found.accepted and not is_open(found):
         found.otherwise = otherwise(found, progress)
@@ -98,9 +98,9 @@ def identify(
     return Finding(_verdict(found, conclusion, left, dataset, seed, clock.seconds), evidence)
 
 
-def _left(found: Search) -> tuple[Unexplained, ...]:
+def _left(found: Search, known: Sequence[Unexplained] = ()) -> tuple[Unexplained, ...]:
     everything = (*found.problem.of("train"), *found.problem.of("test"))
-    return leftovers(found.problem, extended(found), everything)
+    return leftovers(found.problem, extended(found), everything, known)
 
 
 def _evidence(found: Search) -> Evidence:

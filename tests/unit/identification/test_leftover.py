@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from shared.identification.catalogue.backlash import EFFECT as BACKLASH
 from shared.identification.catalogue.viscous_friction import EFFECT as VISCOUS
@@ -75,6 +76,34 @@ def test_a_push_is_located_at_its_joint_and_within_a_tenth_of_a_second(
     assert found[0].torque == pytest.approx(torque, rel=0.3)
     assert found[0].unit == "rad"
     assert found[0].is_external
+
+
+def test_a_push_that_is_known_is_told_again_where_it_does_not_show_anew(tmp_path: Path) -> None:
+    def enter(row: Row) -> None:
+        if row.trajectory == "second":
+            row.torque(PUSH, np.array([3.0, 0.0, 0.0, 2.0]))
+
+    problem = problem_with(tmp_path, enter)
+    (shown,) = left(problem)
+    gone = replace(shown, where="lift", trajectory="first", begin=5.0, end=5.4)
+    over = replace(shown, begin=shown.begin - 0.2, torque=99.0)
+    segments = range(len(problem.segments))
+    again = leftovers(problem, nominal(problem), segments, [over, gone])
+    assert set(again) == {shown, gone}
+
+
+def test_nothing_else_is_told_of_where_a_known_push_was(tmp_path: Path) -> None:
+    problem = hidden(tmp_path, VISCOUS, "elbow", [0.8])
+    before = left(problem)
+    assert {each.where for each in before} == {"elbow"}
+    last = float(problem.dataset.trajectories[0].joints_at[-1])
+    pushes = [
+        replace(before[0], trajectory=each.name, begin=0.0, end=last, is_external=True)
+        for each in problem.dataset.trajectories
+        if not each.repeats
+    ]
+    segments = range(len(problem.segments))
+    assert set(leftovers(problem, nominal(problem), segments, pushes)) == set(pushes)
 
 
 @pytest.mark.parametrize("recording", ["first", "second"])

@@ -7,6 +7,7 @@ import pytest
 from scipy.io import loadmat
 
 from shared.identification.dataset.reading import read_dataset
+from shared.identification.find import identify
 from shared.identification.fit import floor_from_base, polish
 from shared.identification.leftover import leftovers
 from shared.identification.problem import Problem
@@ -96,6 +97,22 @@ def test_pulses_that_the_commands_do_not_know_are_external_and_when_they_were(tm
     assert sorted(each.end for each in found) == pytest.approx(at[1::2], abs=0.05)
     torques = [each.torque for each in found]
     assert torques == pytest.approx([175.8] * 25, rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_the_verdict_names_the_friction_and_calls_each_pulse_external(tmp_path: Path):
+    emps.convert(tmp_path / "hidden", RAW, "hidden")
+    verdict = identify(read_dataset(tmp_path / "hidden"), seed=1).verdict
+    assert verdict.verdict == "named"
+    friction, asymmetry = verdict.causes
+    assert (friction.effect, asymmetry.effect) == ("coulomb_friction", "asymmetric_friction")
+    assert friction.value == pytest.approx(20.4, rel=0.1)  # what the authors have
+    outside = [each for each in verdict.unexplained if each.is_external]
+    assert len(outside) == len(verdict.unexplained) == 25
+    begins = sorted(each.begin for each in outside)
+    assert np.diff(begins) == pytest.approx(np.ones(24), abs=0.05)
+    assert [each.torque for each in outside] == pytest.approx([175.8] * 25, rel=0.1)
 
 
 def test_the_pulses_are_volts_and_the_voltage_log_has_them(tmp_path: Path):
