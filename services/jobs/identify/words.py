@@ -7,6 +7,8 @@ from shared.identification.sentence import as_told
 from shared.identification.verdict import Cause, HeldOut, Interval, Tie, Unexplained, Verdict
 
 WIDTH = 88
+LISTED = 3
+"""Of what stays unexplained, on the screen."""
 TITLES = {
     "named": "A cause was found",
     "none": "Nothing to name",
@@ -133,6 +135,13 @@ def unexplained_text(left: Unexplained, held_out: HeldOut) -> str:
     )
 
 
+def _unexplained_texts(verdict: Verdict) -> list[str]:
+    """Return the largest of what is left, and how many there are beside."""
+    found = [unexplained_text(each, verdict.held_out) for each in verdict.unexplained[:LISTED]]
+    more = len(verdict.unexplained) - len(found)
+    return [*found, f"and {more} more, in the report"] if more else found
+
+
 def when_text(left: Unexplained) -> str:
     """Return when something is left, and whether it came from outside."""
     return f"external, {left.phase}" if left.is_external else left.phase
@@ -160,8 +169,7 @@ def verdict_text(verdict: Verdict, folder: Path) -> str:
     if verdict.causes:
         share = share_text(verdict.held_out.share_removed, verdict.held_out.share_interval)
         add("", [f"removes {share} of what could be explained"])
-    left = [unexplained_text(each, verdict.held_out) for each in verdict.unexplained[:3]]
-    add("unexplained", left)
+    add("unexplained", _unexplained_texts(verdict))
     add("record next", list(verdict.record_next[:3]))
     if not verdict.starts_agree:
         add("beware", ["base fits from different starts did not meet: believe little of this"])

@@ -110,3 +110,16 @@ def test_the_last_lines_say_the_verdict_and_where_the_report_is(word: str) -> No
     for sentence in verdict.record_next:
         assert sentence in flat
     assert max(len(line) for line in text.splitlines()) <= 88
+
+
+@pytest.mark.parametrize(("count", "more"), [(2, ""), (3, ""), (5, "and 2 more, in the report")])
+def test_what_is_left_and_not_listed_is_counted(count: int, more: str) -> None:
+    verdict = example("unexplained").verdict
+    left = tuple(
+        msgspec.structs.replace(verdict.unexplained[0], begin=float(index), end=index + 0.5)
+        for index in range(count)
+    )
+    text = verdict_text(msgspec.structs.replace(verdict, unexplained=left), Path("out"))
+    assert text.count(" times ") >= min(count, 3)
+    assert ("more, in the report" in text) == bool(more)
+    assert more in text
