@@ -31,7 +31,6 @@ def diagnose(
     replays: Sequence[Replay],
     joints: Sequence[str],
     units: Sequence[str],
-    starts: dict[str, float] | None = None,
     floors: Floors | None = None,
 ) -> Diagnostics:
     """Return how the residual of the base fit looks over all trajectories together.
@@ -40,16 +39,12 @@ def diagnose(
         replays: at least one.
         joints: names, in the order of every array.
         units: of each joint, ``rad`` or ``m``.
-        starts: seconds that the arm had already been working when each trajectory began, by name.
         floors: the noise; without it nothing is said about sides.
     """
-    starts = starts or {}
     residual = np.concatenate([each.q - each.predicted["base_fit"] for each in replays])
     velocity = np.concatenate([_velocity(each) for each in replays])
     position = np.concatenate([each.q for each in replays])
-    elapsed = np.concatenate(
-        [each.at - each.at[0] + starts.get(each.name, 0.0) for each in replays]
-    )
+    elapsed = np.concatenate([each.at - each.at[0] + each.begins for each in replays])
     unit = units[0] if len(set(units)) == 1 else "rad, m"
     profiles = [
         _profile("velocity", f"{unit}/s", velocity, residual),

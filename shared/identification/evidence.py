@@ -31,6 +31,8 @@ class Replay:
     """float64[T, J] each; NaN from where the physics diverged."""
     loss: dict[Stage, float]
     """Root-mean-square residual in units of the noise floor, as in the verdict."""
+    begins: float = 0.0
+    """How long the arm had been recorded before (s)."""
     effort: Float64 | None = None
     """float64[T, J], torque as it was logged or commanded, else as the model says that the motion
     takes it (N m, N)."""

@@ -56,9 +56,7 @@ def evidence_of(problem: Problem, stages: dict[Stage, Variant]) -> Evidence:
         tracker_noise=None if tracker is None else (_length(tracker[:3]), _length(tracker[3:])),
         noise_from_repeats=noise.is_measured,
         replays=replays,
-        diagnostics=diagnose(
-            replays, problem.subject.joints, units, _starts(problem), Floors(noise, BLOCK)
-        ),
+        diagnostics=diagnose(replays, problem.subject.joints, units, Floors(noise, BLOCK)),
     )
 
 
@@ -66,6 +64,7 @@ def _replay(
     problem: Problem, of: Trajectory, numbers: list[int], by_stage: dict[Stage, list[Reports]]
 ) -> Replay:
     segments = [problem.segments[number] for number in numbers]
+    earlier = problem.dataset.trajectories[: segments[0].trajectory]
     at = np.concatenate([each.recorded.begin + each.recorded.joints_at for each in segments])
     seen = [
         (each.recorded.begin + each.recorded.tracker_at, each.tracker)
@@ -97,6 +96,7 @@ def _replay(
             for stage, reports in by_stage.items()
         },
         loss={stage: _loss(problem, numbers, reports) for stage, reports in by_stage.items()},
+        begins=sum(each.duration for each in earlier),
         effort=effort_of(problem.subject, of, at),
         tracker_at=tracker_at,
         tracker=tracker,
@@ -108,16 +108,6 @@ def _replay(
 def _loss(problem: Problem, numbers: list[int], reports: list[Reports]) -> float:
     squares = np.concatenate([problem.whitened(reports[each], each) ** 2 for each in numbers])
     return float(np.sqrt(squares.mean()))
-
-
-def _starts(problem: Problem) -> dict[str, float]:
-    """Return how long the arm had been recorded before each trajectory (s), by name."""
-    out: dict[str, float] = {}
-    elapsed = 0.0
-    for each in problem.dataset.trajectories:
-        out[each.name] = elapsed
-        elapsed += each.duration
-    return out
 
 
 def _length(axes: Float64) -> float:

@@ -51,7 +51,7 @@ def sentence_of(
         return (
             f"With its base fitted the simulation is at {ratio}, but something stands out that no "
             f"effect of the catalogue explains: at {first.where}, from {first.begin:.2f} to "
-            f"{first.end:.2f} s of {first.trajectory}, {first.times_noise:.2g} times the noise."
+            f"{first.end:.2f} s of {first.trajectory}, {first.times_noise:.3g} times the noise."
         )
     place = f", most of it at {left[0].where} {left[0].phase}" if left else ""
     return f"Something is wrong that no effect of the catalogue explains: {ratio}{place}."
@@ -64,7 +64,7 @@ def _also_pushed(left: tuple[Unexplained, ...]) -> str:
         return ""
     first = pushes[0]
     count = "once," if len(pushes) == 1 else f"{len(pushes)} times, most"
-    size = "" if first.torque is None else f" with {first.torque:.2g} {first.torque_unit}"
+    size = "" if first.torque is None else f" with {first.torque:.3g} {first.torque_unit}"
     return (
         f" Something outside pushed {first.where} {count} from "
         f"{first.begin:.2f} to {first.end:.2f} s of {first.trajectory}{size}."

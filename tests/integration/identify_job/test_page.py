@@ -185,6 +185,7 @@ def test_an_arm_of_one_joint_that_slides_has_a_page() -> None:
     page = read(slid)
     assert "cart (m)" in page.figures
     assert "mrad" not in page.figures
+    assert ["stage", "x noise", "joints, mm"] in page.rows
 
 
 @pytest.mark.slow

@@ -72,10 +72,10 @@ def test_what_happened_once_is_not_passed_over(searches: Searches):
 
 
 def test_a_push_beside_a_cause_is_told_with_it(searches: Searches):
-    push = msgspec.structs.replace(_PUSH, is_external=True, torque=2.0, torque_unit="N m")
+    push = msgspec.structs.replace(_PUSH, is_external=True, torque=175.8, torque_unit="N m")
     found = conclude(searches.search(_BAD, searches.tried(ELBOW, _BAD, _GOOD)), (push,))
     assert found.word == "named"
-    assert "pushed elbow once, from 0.50 to 0.60 s of first with 2 N m" in found.sentence
+    assert "pushed elbow once, from 0.50 to 0.60 s of first with 176 N m" in found.sentence
     alone = conclude(searches.search(_GOOD), (push, push))
     assert alone.word == "unexplained"
     assert "Nothing to name but what came from outside" in alone.sentence

@@ -32,6 +32,7 @@ def test_evidence_has_every_recording_under_every_stage(tmp_path: Path) -> None:
     found = gathered(tmp_path, VISCOUS, "elbow", [1.0])
     assert [each.name for each in found.replays] == ["first", "second"]
     assert [each.name for each in found.held_out] == ["second"]
+    assert [each.begins for each in found.replays] == pytest.approx([0.0, 4.0], abs=0.02)
     first = found.replays[0]
     assert first.loss["base_fit"] == first.loss["nominal"] > 2.0
     assert first.loss["extended"] == pytest.approx(1.0, abs=0.1)

@@ -1,5 +1,7 @@
 """What the pictures show is computed right."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from services.jobs.identify.residuals import (
     window_of,
     worst_joint,
 )
+from shared.identification.diagnose import diagnose
 from tests.unit.identify_job.examples import NOISE, example
 
 
@@ -64,3 +67,18 @@ def test_the_tracker_is_off_by_a_distance() -> None:
     assert set(off) == {"nominal", "base_fit", "extended"}
     assert off["extended"].mean() == pytest.approx(5e-4 * np.sqrt(8 / np.pi), rel=0.2)
     assert tracker_off(example("named", has_tracker=False).evidence.replays[0]) == {}
+
+
+def test_time_since_the_start_is_the_same_before_and_after() -> None:
+    found = example("named").evidence
+    begins, replays = 0.0, []
+    for replay in found.replays:
+        replays.append(replace(replay, begins=begins))
+        begins += float(replay.at[-1])
+    before = diagnose(replays, found.joints, found.units)
+    after = diagnostics_after(replace(found, replays=tuple(replays), diagnostics=before))
+    over_time = [
+        next(each for each in one.profiles if each.over == "time") for one in (before, after)
+    ]
+    assert over_time[1].centres == pytest.approx(over_time[0].centres)
+    assert over_time[0].centres.max() > 0.9 * begins
