@@ -122,7 +122,7 @@ def stages_against_noise(values: Mapping[str, float], floor: str = "the noise fl
         axes.set_ylim(len(values) - 0.45, -0.75)
         axes.set_xlim(0.0, 1.18 * max(1.0, float(lengths.max())))
         axes.grid(visible=False, axis="y")
-        axes.set_xlabel(f"residual on held-out motion; 1 is {floor}")
+        axes.set_xlabel(f"held-out residual; 1 is {floor}")
         return drawn(figure)
 
 
@@ -232,7 +232,7 @@ def timeline(
         if picture is not None:
             bar = figure.colorbar(picture, ax=axes, location="bottom", shrink=0.8, aspect=40)
             bar.set_ticks([0.0, np.log10(3.0), 1.0, np.log10(20.0)], labels=["1", "3", "10", "20"])
-            bar.set_label(f"extended model's residual; 1 is {floor}")
+            bar.set_label(f"left by the extended model; 1 is {floor}")
             bar.outline.set_visible(False)
         return drawn(figure)
 
