@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from services.jobs.identify.residuals import rms_by_joint, shown, stages_of, tracker_off
-from services.jobs.identify.words import cause_text, unexplained_text
+from services.jobs.identify.words import THOUSANDTHS, cause_text, unexplained_text
 from shared.identification.dataset.types import Dataset, Float64
 from shared.identification.evidence import Evidence, Replay
 from shared.identification.subject import plant_of
@@ -124,7 +124,7 @@ def _joints(
             motion[stage] = predicted
             residual[stage] = 1e3 * (measured - predicted)
         unit = evidence.units[joint]
-        units = (unit, "mm" if unit == "m" else "mrad")
+        units = (unit, THOUSANDTHS[unit])
         curves.append(Curves(evidence.joints[joint], units, at, motion, residual))
     return curves
 

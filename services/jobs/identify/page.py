@@ -176,10 +176,7 @@ def _held_out(verdict: Verdict, evidence: Evidence) -> Html:
         floor,
         *((_of(held_out.tracker_mm, "noise_floor"),) if held_out.tracker_mm else ()),
     ))  # fmt: skip
-    unit = " or ".join(
-        {"rad": "mrad", "m": "mm"}[each] for each in sorted(set(evidence.units))[::-1]
-    )
-    headers = ["stage", "x noise", f"joints, {unit}"]
+    headers = ["stage", "x noise", f"joints, {pictures.small_unit(evidence)}"]
     headers += ["tracker, mm"] if held_out.tracker_mm else []
     share = words.share_text(held_out.share_removed, held_out.share_interval)
     caption = (

@@ -17,7 +17,7 @@ from services.jobs.identify.residuals import (
     window_of,
     worst_joint,
 )
-from services.jobs.identify.words import floor_name, floor_text, unexplained_mark
+from services.jobs.identify.words import THOUSANDTHS, floor_name, floor_text, unexplained_mark
 from shared.identification.dataset.types import Float64
 from shared.identification.evidence import Diagnostics, Evidence
 from shared.identification.verdict import BaseValue, Scored, Verdict
@@ -66,7 +66,7 @@ def by_joint(verdict: Verdict, evidence: Evidence) -> Picture:
     found = {stage: 1e3 * rms_by_joint(replays, stage) for stage in stages_of(verdict)}
     finite = {stage: np.where(np.isfinite(v), v, np.nan) for stage, v in found.items()}
     svg = figures.residuals_by_joint(
-        evidence.joints, finite, 1e3 * evidence.noise, _small_unit(evidence)
+        evidence.joints, finite, 1e3 * evidence.noise, small_unit(evidence)
     )
     floor = (
         "its noise floor, from repeats"
@@ -96,7 +96,7 @@ def motion(window: Window, verdict: Verdict, evidence: Evidence) -> Picture:
 def left_over(window: Window, verdict: Verdict, evidence: Evidence) -> Picture:
     """Return what each stage leaves over in the same stretch."""
     index = window.joint
-    small = _thousandths(evidence.units[index])
+    small = THOUSANDTHS[evidence.units[index]]
     residuals = {
         str(stage): 1e3 * residual(window.replay, stage)[window.rows, index]
         for stage in stages_of(verdict)[1:]
@@ -161,7 +161,7 @@ def _profile(evidence: Evidence, before: Diagnostics, after: Diagnostics, joint:
     ]  # fmt: skip
     axis = AXES.get(one.over, one.over)
     svg = diagnostic.profile(
-        lines, f"{axis} ({one.unit})", f"mean residual ({_thousandths(evidence.units[joint])})",
+        lines, f"{axis} ({one.unit})", f"mean residual ({THOUSANDTHS[evidence.units[joint]]})",
         is_before_and_after=True,
     )  # fmt: skip
     words = (
@@ -225,7 +225,7 @@ def diagnostics(evidence: Evidence) -> list[Picture]:
     found = evidence.diagnostics
     off = rms_by_joint(evidence.replays, "base_fit") / evidence.noise
     worst = [int(index) for index in np.argsort(-np.nan_to_num(off, posinf=1e9))[:MOST_JOINTS]]
-    small = _small_unit(evidence)
+    small = small_unit(evidence)
     pictures: list[Picture] = []
     for each in found.profiles:
         lines = [
@@ -284,10 +284,7 @@ def _spread(mean: Float64, rms: Float64) -> Float64:
     return np.sqrt(np.maximum(rms**2 - mean**2, 0.0))
 
 
-def _thousandths(unit: str) -> str:
-    return "mm" if unit == "m" else "mrad"
-
-
-def _small_unit(evidence: Evidence) -> str:
-    names = sorted({_thousandths(unit) for unit in evidence.units}, reverse=True)
+def small_unit(evidence: Evidence) -> str:
+    """Return what residuals of all joints are told in."""
+    names = sorted({THOUSANDTHS[unit] for unit in evidence.units}, reverse=True)
     return ", ".join(names)

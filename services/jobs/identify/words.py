@@ -17,7 +17,7 @@ TITLES = {
     "unexplained": "Something is left that has no name",
 }
 """Of each verdict."""
-_SMALLER = {"s": "ms", "m": "mm", "rad": "mrad"}
+THOUSANDTHS = {"s": "ms", "m": "mm", "rad": "mrad"}
 """Units whose thousandths have a name of their own."""
 MINUS = "\N{MINUS SIGN}"
 
@@ -47,8 +47,8 @@ def number_text(value: float, digits: int = 3) -> str:
 def _scaled(unit: str, *values: float) -> tuple[str, float]:
     """Return a unit that fits the largest of values, and what to multiply them by."""
     largest = max((abs(value) for value in values), default=0.0)
-    if unit in _SMALLER and 0.0 < largest < 0.1:
-        return _SMALLER[unit], 1e3
+    if unit in THOUSANDTHS and 0.0 < largest < 0.1:
+        return THOUSANDTHS[unit], 1e3
     return ("" if unit == "1" else unit), 1.0
 
 
