@@ -16,7 +16,6 @@ from shared.identification.base import INERTIA_PRIOR, BaseParameter, base_parame
 from shared.identification.causes import motion, rival
 from shared.identification.certainty import half_widths, is_there
 from shared.identification.dataset.types import Float64
-from shared.identification.effect import ONCE
 from shared.identification.fit import WINDOW, Fit, polish
 from shared.identification.gate import compare, stretches
 from shared.identification.problem import Problem
@@ -100,7 +99,7 @@ def _instead(found: Search, space: Space, near: Float64) -> list[Screened]:
     residual = parts.residual([near], pieces)[0]
     jacobian = np.zeros((len(residual), space.size))
     jacobian[-space.size :] = np.diag(1.0 / space.priors)
-    steady = [each for each in found.candidates if each.effect.name != ONCE]
+    steady = [each for each in found.candidates if each.recording is None]
     screened = screen(Fit.of(parts, near, residual, jacobian), steady, pieces)
     return [each for each in screened if each.share > _MOST * screened[0].share][:_TRIED]
 

@@ -79,8 +79,9 @@ def screen(fit: Fit, candidates: Sequence[Candidate], segments: tuple[int, ...])
     rows = fit.space.problem.rows_of(segments, picked)
     subject = fit.space.problem.subject
     once = [each for each in candidates if each.recording is not None]
-    steady = [each for each in candidates if each not in once and _is_steady(subject, each)]
-    local = [each for each in candidates if each not in once and each not in steady]
+    lasting = [each for each in candidates if each.recording is None]
+    steady = [each for each in lasting if _is_steady(subject, each)]
+    local = [each for each in lasting if not _is_steady(subject, each)]
     found = sorted(_screened(_on(fit, rows), steady, picked, None), key=_best_first)
     is_plain = 2.0 * fit.cost > _PLAIN * len(fit.residual)
     if len(picked) < len(segments) and not is_plain:

@@ -4,7 +4,7 @@ import numpy as np
 
 from shared.identification.certainty import is_there
 from shared.identification.dataset.types import Float64
-from shared.identification.effect import ONCE, Candidate
+from shared.identification.effect import Candidate
 from shared.identification.family import Family, look_elsewhere, relatives
 from shared.identification.fewer import one_for_many, prune
 from shared.identification.fit import Fit, polish
@@ -175,7 +175,7 @@ def _explains_event(found: Search, candidate: Candidate, fit: Fit, train: tuple[
     Held-out recordings cannot show what happened once in another one. What stands out must be far
     over everything else, more than noise that is the same throughout would ever be.
     """
-    if candidate.effect.name != ONCE:
+    if candidate.recording is None:
         return False
     problem = found.problem
     before = stretches(problem, found.current.space.variant(found.current.z), train)

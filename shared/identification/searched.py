@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shared.identification.dataset.types import Float64
-from shared.identification.effect import ONCE, Candidate
+from shared.identification.effect import Candidate
 from shared.identification.fit import Fit, Start
 from shared.identification.gate import Gain, compare
 from shared.identification.left_out import left_out
@@ -163,7 +163,7 @@ def judged(found: Search, candidate: Candidate, before: Model, after: Model) -> 
         found.rng,
     )
     surely = max(gain.surely, min(whole.surely, gain.gain - gain.error))
-    if candidate.effect.name == ONCE:
+    if candidate.recording is not None:
         surely = -np.inf  # there it only frees the base, of whatever it is
     gain = replace(gain, surely=surely, is_measured=found.problem.noise.is_measured)
     return Judged(gain, more.after)
