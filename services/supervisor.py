@@ -17,7 +17,7 @@ from typing import Literal
 
 from shared.clock import Clock
 from shared.errors import RiposteError
-from shared.runtime.process import THREAD_LIMITS
+from shared.runtime.process import SERVICE_ENVIRONMENT
 from shared.runtime.serve import EXIT_BAD_INPUT, EXIT_BUS_LOST
 
 FIRST_DELAY = 0.2
@@ -201,7 +201,7 @@ class Supervisor:
                     stdin=subprocess.DEVNULL,
                     stdout=output,
                     stderr=subprocess.STDOUT,
-                    env=os.environ | THREAD_LIMITS,
+                    env=os.environ | SERVICE_ENVIRONMENT,
                     cwd=child.spec.cwd,
                     process_group=0,  # Ctrl-C reaches the supervisor alone, which stops in order
                 )

@@ -24,12 +24,11 @@ MAX_NAMED = 4 * MAX_MESSAGE
 """Up to here a locked router reads a message that is too long, to say whose it was (bytes): what is
 longer the library throws away without a word."""
 
-SHARED_MEMORY_POOL = MIB
-"""What one process passes to others at a time (bytes); what does not fit goes through the socket.
-Whoever gets something maps the whole pool of its sender, so it counts once in each process."""
-
-LARGER_POOLS = {"actor": 4 * MIB, "router": 6 * MIB}
-"""The same of those that send rollouts, which are 0.9 MB at the default sizes, or pass them on."""
+SHARED_MEMORY_POOLS = {"actor": 4 * MIB}
+"""What a process passes to others at a time, by role (bytes); what does not fit goes through the
+socket, and so does everything of other roles. Rollouts, 0.9 MB at the default sizes, are nearly all
+that is sent; a router passes on where they lie. Whoever gets something this way maps the pool of
+its sender and keeps 4 MB of books beside it, so an actor had 27 MB for a policy a second."""
 
 _ENDPOINT = re.compile(
     r"(?P<protocol>tcp|tls|quic)/(?P<host>\[[0-9a-fA-F:.]+\]|[^:/\[\]?#]+):[0-9]{1,5}"
@@ -255,9 +254,12 @@ def _common(cfg: BusConfig, role: str) -> dict[str, Any]:
                     },
                 },
             },
-            "shared_memory": {
-                "enabled": cfg.shared_memory,
-                "transport_optimization": {"pool_size": LARGER_POOLS.get(role, SHARED_MEMORY_POOL)},
-            },
+            "shared_memory": {"enabled": cfg.shared_memory, "transport_optimization": _pool(role)},
         },
     }
+
+
+def _pool(role: str) -> dict[str, Any]:
+    """Return how a role passes large messages on by itself."""
+    size = SHARED_MEMORY_POOLS.get(role)
+    return {"enabled": False} if size is None else {"enabled": True, "pool_size": size}
