@@ -142,6 +142,7 @@ def _held_out(found: Search) -> HeldOut:
         joints_mrad=joints,
         tracker_mm=tracker,
         is_floor_measured=problem.noise.is_measured,
+        by_all=None if found.left_by_all is None else float(np.sqrt(found.left_by_all)),
     )
 
 

@@ -86,10 +86,9 @@ def identify(
         clock.over("search")
         left = _left(found, [each for each in left if each.is_external])
         clock.over("unexplained")
+    fit_to_all(found, left)
     if not found.accepted and not is_open(found):
         found.otherwise = otherwise(found, progress)
-        clock.over("search")
-    fit_to_all(found, left)
     clock.over("search")
     progress("diagnostics", 0.0)
     evidence = _evidence(found)

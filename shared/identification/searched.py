@@ -103,6 +103,9 @@ class Search:
     """The current model fitted to all recordings, for sizes; nothing is judged by it."""
     fitted_to: tuple[int, ...] = ()
     """Segments of the final fit."""
+    left_by_all: float | None = None
+    """Mean square residual of the current model fitted to all recordings, in noise floors: of those
+    that were fitted to before or of the others, whichever is more. None where it was not asked."""
 
     @property
     def told(self) -> Fit:
@@ -115,15 +118,17 @@ def is_open(found: Search) -> bool:
 
     Links far from what is known of them say that the base is of another kind than the arm: what
     takes much off then may be anything, so it has to take off nearly all. So may what only mends
-    what a base fit had spoiled, of motion unlike what it was fitted to.
+    what a base fit had spoiled, of motion unlike what it was fitted to. What goes once the model
+    may go by all recordings is only what those to fit to did not show of it.
     """
-    base, left = float(found.base_losses.mean()), float(found.current_losses.mean())
+    base, held_out = float(found.base_losses.mean()), float(found.current_losses.mean())
+    left = min(held_out, np.inf if found.left_by_all is None else found.left_by_all)
     if found.accepted:
-        if left >= float(found.nominal_losses.mean()):
+        if held_out >= float(found.nominal_losses.mean()):
             return True
         most = BESIDE_A_DOUBT if found.doubted else np.inf
         return left > max(BESIDE_A_NAME, min(MAY_BE_LEFT * base, most))
-    return base > NEARLY_NOISE
+    return left > NEARLY_NOISE
 
 
 class Model(NamedTuple):

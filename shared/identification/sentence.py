@@ -20,7 +20,7 @@ def sentence_of(
     if word == "named":
         return (
             f"What the simulation gets wrong: {_named(causes)}. Held out, the residual goes from "
-            f"{ratio} to {held_out.extended:.2f}.{_also_pushed(left)}"
+            f"{ratio} to {held_out.extended:.2f}{_by_all(held_out)}.{_also_pushed(left)}"
         )
     if word == "tie":
         either = " or ".join(label(cause) for cause in ties[0].causes)
@@ -29,7 +29,8 @@ def sentence_of(
             return told
         return f"What the simulation surely gets wrong: {_named(causes)}. Beside it: {told}"
     if word == "none":
-        return f"Nothing to name: with its base fitted the simulation is at {ratio}."
+        told = f"{ratio}{_by_all(held_out)}"
+        return f"Nothing to name: with its base fitted the simulation is at {told}."
     if word == "base_too_coarse":
         return (
             f"The base model does not fit: {ratio} are left with links far from their known mass. "
@@ -55,6 +56,12 @@ def sentence_of(
         )
     place = f", most of it at {left[0].where} {left[0].phase}" if left else ""
     return f"Something is wrong that no effect of the catalogue explains: {ratio}{place}."
+
+
+def _by_all(held_out: HeldOut) -> str:
+    """Return what is left with held-out motion in the fit, where the verdict goes by that."""
+    left = held_out.by_all
+    return "" if left is None else f", {left:.2f} once it is fitted to these, too"
 
 
 def _also_pushed(left: tuple[Unexplained, ...]) -> str:

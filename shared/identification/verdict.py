@@ -96,6 +96,9 @@ class HeldOut(_Part, frozen=True, kw_only=True):
     is_floor_measured: bool = True
     """Whether recordings that repeat each other measured the noise floor. Else 1 is what the base
     fit usually leaves (the median) of the motion that it was fitted to, in parts of a second."""
+    by_all: float | None = None
+    """What the extended model leaves once it is fitted to the held-out trajectories, too: what goes
+    thereby is what the others did not show of it. None where that was not asked."""
 
 
 class Scored(_Part, frozen=True, kw_only=True):

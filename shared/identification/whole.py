@@ -1,13 +1,17 @@
-"""Fits what was named once more, to all recordings.
+"""Fits what a search came to once more, to all recordings.
 
 Which causes there are is judged on recordings that nothing was fitted to. Once that is done those
-may say how large they are, too: of five recordings two would otherwise have no say in it.
+may say how large they are, too: of five recordings two would otherwise have no say in it. They may
+also say how much of what is left comes of what the others did not show of the base, a friction
+that only one of them begins with: that is no cause.
 """
 
 from collections.abc import Sequence
 
-from shared.identification.fit import polish
-from shared.identification.searched import Search
+import numpy as np
+
+from shared.identification.fit import Fit, polish
+from shared.identification.searched import Search, is_open
 from shared.identification.verdict import Unexplained
 
 _STEPS = 1
@@ -15,10 +19,10 @@ _STEPS = 1
 
 
 def fit_to_all(found: Search, left: Sequence[Unexplained]) -> None:
-    """Fit a search's model to the held-out recordings, too, if a cause was accepted.
+    """Fit a search's model to the held-out recordings, too.
 
-    Held-out recordings in which something pushed the arm, or in which blocks do not count, stay
-    out of it.
+    If a cause was accepted, for its size; if much is left, for how much of that remains. Held-out
+    recordings in which something pushed the arm, or in which blocks do not count, stay out of it.
 
     Args:
         found: the search, over.
@@ -33,7 +37,18 @@ def fit_to_all(found: Search, left: Sequence[Unexplained]) -> None:
         if segment not in problem.uncounted
         and names[problem.segments[segment].trajectory] not in pushed
     )
-    if not found.accepted or not more:
+    is_asked = is_open(found) and problem.noise.is_measured
+    if not more or not (found.accepted or is_asked):
         return
     segments = (*problem.of("train"), *more)
-    found.final, found.fitted_to = polish(current.space, current.z, segments, _STEPS), segments
+    fit = polish(current.space, current.z, segments, _STEPS)
+    if found.accepted:
+        found.final, found.fitted_to = fit, segments
+    if is_asked:
+        found.left_by_all = max(_left(fit, segments, of) for of in (problem.of("train"), more))
+
+
+def _left(fit: Fit, segments: tuple[int, ...], of: tuple[int, ...]) -> float:
+    """Return the mean square residual of some of the segments of a fit."""
+    rows = fit.space.problem.rows_of(segments, of)
+    return float(np.mean(fit.residual[: len(rows)][rows] ** 2))

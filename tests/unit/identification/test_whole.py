@@ -94,7 +94,42 @@ def test_blocks_that_do_not_count_keep_their_recording_out(searches: Searches):
     assert found.final is None
 
 
-def test_a_base_by_itself_is_not_fitted_again(searches: Searches):
+def test_a_base_by_itself_is_not_fitted_again_where_little_is_left(searches: Searches):
     found = searches.search(_GOOD)
     fit_to_all(found, ())
     assert found.final is None
+    assert found.left_by_all is None
+
+
+def test_what_goes_once_held_out_recordings_have_a_say_is_not_left_unexplained(searches: Searches):
+    space = Space(searches.problem, (ELBOW,))
+    fit = polish(space, np.zeros(space.size), searches.problem.of("train"), 4)
+    tried = replace(searches.tried(ELBOW, _BAD, 3.0 * _GOOD), fit=fit)
+    found = searches.search(_BAD, tried)
+    assert conclude(found, ()).word == "unexplained"
+    fit_to_all(found, ())
+    assert found.left_by_all is not None
+    assert 0.5 < found.left_by_all < 1.5
+    after = conclude(found, ())
+    assert after.word == "named"
+    assert after.held_out.by_all == pytest.approx(np.sqrt(found.left_by_all))
+    assert f"{after.held_out.by_all:.2f} once it is fitted to these, too" in after.sentence
+
+
+def test_what_stays_with_every_recording_in_the_fit_is_unexplained(searches: Searches):
+    found = searches.search(_BAD)
+    fit_to_all(found, ())
+    assert found.final is None
+    assert found.left_by_all is not None
+    assert found.left_by_all > 2.0
+    assert conclude(found, ()).word == "unexplained"
+
+
+def test_without_a_measured_floor_held_out_recordings_have_no_say_in_what_is_left(
+    searches: Searches,
+):
+    found = searches.search(_BAD)
+    noise = replace(searches.problem.noise, is_measured=False)
+    found.problem = replace(searches.problem, noise=noise)
+    fit_to_all(found, ())
+    assert found.left_by_all is None
