@@ -41,7 +41,7 @@ def cost(path: Path, began_at: float, ended_at: float) -> dict[str, float]:
 
 def share_of_a_run(seconds: float) -> dict[str, Any]:
     """Return what one training run spent, and on the bus, in CPU seconds a second."""
-    with training_run(ENDLESS, wrap=["benchmarks.counted_service"]) as run:
+    with training_run(ENDLESS, wrap="benchmarks.counted_service") as run:
         window = run.window(seconds)
         found = {
             path.stem: cost(path, window["began_at"], window["ended_at"])

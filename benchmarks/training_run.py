@@ -27,6 +27,8 @@ ENDLESS = ("league.antagonist_updates=1000000", "league.convergence_min_updates=
 """One stage: the antagonist against the frozen first protagonist."""
 WARM_VERSION = 4
 """The first version is the normaliser's warm-up, the next few fill the pipeline."""
+UNTAUGHT = "benchmarks.scaling.untaught"
+"""What a learner is wrapped in to leave PPO out."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -160,20 +162,21 @@ class TrainingRun(RunReader):
 
 @contextlib.contextmanager
 def training_run(
-    overrides: Sequence[str] = ENDLESS, wrap: Sequence[str] = ()
+    overrides: Sequence[str] = ENDLESS, wrap: str = "", of: str = ""
 ) -> Iterator[TrainingRun]:
     """Run a training, in a folder of its own, until the block ends.
 
     Args:
         overrides: of the default settings.
-        wrap: module arguments to put before the service's module: ``python -m WRAP ...``.
+        wrap: module to put before the services' modules: ``python -m WRAP services.role ...``.
+        of: how the names of the processes begin that it is put before; all of them.
     """
     folder = Path(tempfile.mkdtemp(prefix="riposte-bench-"))
     settings = Settings.load(None, ["recorder.live=false", *overrides])
     (folder / "config.toml").write_text(settings.to_toml(), encoding="utf-8")
     specs = processes(settings, folder, folder.name, f"tcp/127.0.0.1:{free_port()}")
     if wrap:
-        specs = [dataclasses.replace(spec, argv=_wrapped(spec.argv, wrap)) for spec in specs]
+        specs = [wrapped(spec, wrap) if spec.name.startswith(of) else spec for spec in specs]
     run = TrainingRun(specs, folder)
     try:
         yield run
@@ -182,7 +185,7 @@ def training_run(
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _wrapped(argv: tuple[str, ...], wrap: Sequence[str]) -> tuple[str, ...]:
-    """Return ``python -P -m WRAP services.role ...`` for ``python -P -m services.role ...``."""
-    at = argv.index("-m") + 1
-    return (*argv[:at], *wrap, *argv[at:])
+def wrapped(spec: ProcessSpec, module: str) -> ProcessSpec:
+    """Return a process that runs ``python -P -m MODULE services.role ...``."""
+    at = spec.argv.index("-m") + 1
+    return dataclasses.replace(spec, argv=(*spec.argv[:at], module, *spec.argv[at:]))

@@ -18,7 +18,7 @@ import msgspec
 import psutil
 
 from benchmarks.scaling.synthetic import Totals
-from benchmarks.training_run import ENDLESS, RunReader
+from benchmarks.training_run import ENDLESS, UNTAUGHT, RunReader, wrapped
 from services.jobs.settings import Settings
 from services.jobs.train.command import processes
 from services.league.config import LeagueConfig
@@ -262,7 +262,7 @@ def scaling_site(setup: Setup, rollout: Path, lease_seconds: float = 2.0) -> Ite
     (folder / "config.toml").write_text(settings.to_toml(), encoding="utf-8")
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     specs = [
-        spec if setup.updates else _untaught(spec)
+        wrapped(spec, UNTAUGHT) if _is_untaught(spec, setup) else spec
         for spec in processes(settings, folder, folder.name, endpoint)
         if not spec.name.startswith("actor-")
     ]
@@ -274,10 +274,6 @@ def scaling_site(setup: Setup, rollout: Path, lease_seconds: float = 2.0) -> Ite
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _untaught(spec: ProcessSpec) -> ProcessSpec:
-    """Return a learner's process without PPO; any other as it is."""
-    if not spec.name.startswith("learner-"):
-        return spec
-    at = spec.argv.index("-m") + 1
-    argv = (*spec.argv[:at], "benchmarks.scaling.untaught", *spec.argv[at:])
-    return dataclasses.replace(spec, argv=argv)
+def _is_untaught(spec: ProcessSpec, setup: Setup) -> bool:
+    """Return whether a process is a learner that is to leave PPO out."""
+    return not setup.updates and spec.name.startswith("learner-")
