@@ -35,6 +35,9 @@ _EVENT = 4.0
 what happened once would be most of the mean, and most of its error."""
 _NEARLY = 0.05
 """Of the cost on what was fitted to: by so much two causes that hardly differ may be apart."""
+_LOADS = {"counterbalance", "torque_bias"}
+"""Causes of which neither is told from the other by a few postures: near one of them a load that
+depends on posture is a constant torque, whatever numbers either has."""
 
 
 def search(found: Search, progress: Progress) -> None:
@@ -214,8 +217,11 @@ def _simplest(useful: list[Tried], rng: np.random.Generator) -> tuple[Tried, tup
     fewest = min(one.numbers for one in alike)
     simple = [one for one in alike if one.numbers == fewest]
     taken = min(simple, key=lambda one: left[one.candidate].mean())
-    near = [one for one in useful if _is_nearly(taken, one, rng)]
-    return taken, tuple(one for one in [*simple, *near] if one is not taken)
+    others = [one for one in useful if one is not taken]
+    as_simple = {one.candidate for one in simple}
+    return taken, tuple(
+        one for one in others if one.candidate in as_simple or _is_nearly(taken, one, rng)
+    )
 
 
 def _is_nearly(taken: Tried, other: Tried, rng: np.random.Generator) -> bool:
@@ -223,7 +229,8 @@ def _is_nearly(taken: Tried, other: Tried, rng: np.random.Generator) -> bool:
 
     Both of the recordings that were fitted to and of those that were held out.
     """
-    if LATE.get(other.candidate.effect.name) != taken.candidate.effect.name:
+    names = other.candidate.effect.name, taken.candidate.effect.name
+    if LATE.get(names[0]) != names[1] and set(names) != _LOADS:
         return False
     margin = compare(other.losses, taken.losses, rng)
     return margin.gain < margin.error and other.fit.cost <= (1 + _NEARLY) * taken.fit.cost

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from shared.identification.catalogue.command_latency import EFFECT as LATE
+from shared.identification.catalogue.counterbalance import EFFECT as BALANCE
 from shared.identification.catalogue.sample_and_hold import EFFECT as TURNS
 from shared.identification.catalogue.torque_bias import EFFECT as BIAS
 from shared.identification.catalogue.torque_gain import EFFECT as GAIN
@@ -114,6 +115,22 @@ def test_turns_so_short_that_they_are_a_delay_are_a_rival_of_it(searches: Search
     taken, rivals = _simplest([turns, late, other], np.random.default_rng(0))
     assert taken is late
     assert rivals == (turns,)
+
+
+def test_a_counterbalance_and_a_constant_torque_are_rivals_unless_one_does_surely_better(
+    searches: Searches,
+):
+    torque = searches.tried(ELBOW, _BAD, _GOOD)
+    about = 0.01 + np.tile([-0.06, 0.06], 4)
+    balance = searches.tried(Candidate(BALANCE, "elbow"), _BAD, _GOOD + about, numbers=2)
+    assert _simplest([balance, torque], np.random.default_rng(0)) == (torque, (balance,))
+    surely = searches.tried(Candidate(BALANCE, "elbow"), _BAD, _GOOD + 0.05, numbers=2)
+    assert _simplest([surely, torque], np.random.default_rng(0)) == (torque, ())
+    fit = replace(torque.fit, cost=balance.fit.cost)
+    better = replace(torque, fitted=_GOOD + 2.0, fit=fit), replace(balance, fitted=_GOOD)
+    taken, rivals = _simplest(list(better), np.random.default_rng(0))
+    assert taken is better[1]
+    assert [one.candidate for one in rivals] == [ELBOW]
 
 
 @pytest.mark.parametrize(("more", "cost"), [(0.02, 1.0), (0.0, 1.2)])
