@@ -43,7 +43,8 @@ class Screened:
     shift: Float64
     """float64[n], how the base moves with it."""
     share: float
-    """Of the training residual that it takes off."""
+    """Of the training residual that the base leaves, at its best as far as its derivative says,
+    which it takes off."""
     signature: Float64
     """float64[K], of unit length, what the base cannot absorb of it in some rows of the residual,
     the same ones for all candidates; empty if nothing."""
@@ -135,7 +136,6 @@ def _screened(
     problem, base = fit.space.problem, fit.space.variant(fit.z)
     basis, triangle = np.linalg.qr(fit.jacobian)
     left = fit.residual - basis @ (basis.T @ fit.residual)
-    total = float(fit.residual @ fit.residual)
     variants: list[Variant] = []
     looks: list[list[tuple[_Look, slice]]] = []
     for candidate in candidates:
@@ -151,7 +151,7 @@ def _screened(
     out: list[Screened] = []
     for candidate, begun in zip(candidates, looks, strict=True):
         tried = [
-            _judge(candidate, found[of].T, look, basis, triangle, left, fit, total, shown)
+            _judge(candidate, found[of].T, look, basis, triangle, left, fit, shown)
             for look, of in begun
         ]
         out.append(max(tried, key=lambda each: each.share))
@@ -215,7 +215,7 @@ def _signatures(
 
 def _judge(
     candidate: Candidate, columns: Float64, look: _Look, basis: Float64, triangle: Float64,
-    left: Float64, fit: Fit, total: float, shown: slice | NDArray[np.bool_],
+    left: Float64, fit: Fit, shown: slice | NDArray[np.bool_],
 ) -> Screened:  # fmt: skip
     bare = columns - basis @ (basis.T @ columns)
     size = np.linalg.norm(bare, axis=0)
@@ -230,7 +230,8 @@ def _judge(
     if look.is_level:
         best = np.clip(best, 1.0 / _NEAR, _NEAR)
     explained = bare @ best
-    share = float(left @ left - (left + explained) @ (left + explained)) / max(total, 1e-12)
+    total = float(left @ left)
+    share = (total - float((left + explained) @ (left + explained))) / max(total, 1e-12)
     shift = least_squares(triangle, -(basis.T @ (fit.residual + columns @ best)))
     direction = explained[shown]
     direction = direction / max(float(np.linalg.norm(direction)), 1e-12)

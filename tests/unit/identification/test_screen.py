@@ -11,7 +11,7 @@ from shared.identification.catalogue.stribeck_friction import EFFECT as STRIBECK
 from shared.identification.catalogue.torque_bias import EFFECT as BIAS
 from shared.identification.catalogue.torque_saturation import EFFECT as SATURATION
 from shared.identification.effect import Candidate, Effect
-from shared.identification.fit import polish
+from shared.identification.fit import Fit, polish
 from shared.identification.screen import Screened, screen
 from shared.identification.space import Space
 from shared.sim.plant.row import Row
@@ -56,6 +56,22 @@ def test_an_effect_without_a_form_is_looked_at_as_before(tmp_path: Path) -> None
     best, (torque,) = screened(tmp_path, BIAS, [0.5])
     assert best.candidate.label == "torque_bias elbow"
     assert torque == pytest.approx(0.5, rel=0.3)
+
+
+def test_seen_from_the_nominal_model_what_the_base_makes_up_for_hides_no_cause(tmp_path: Path):
+    def enter(row: Row) -> None:
+        BIAS.enter(row, "elbow", np.array([0.1]))
+        row.field("dof_damping")[row.dofs[0]] = 0.7
+
+    problem = problem_of(measure(tmp_path, np.random.default_rng(0), enter, seconds=4.0))
+    space, segments = Space(problem), problem.of("train")
+    candidates = [Candidate(BIAS, place) for place in ("lift", "elbow")]
+    nominal = Fit.at(space, np.zeros(space.size), segments)
+    alone = Fit.at(space, polish(space, np.zeros(space.size), segments, 2).z, segments)
+    assert alone.cost < 0.5 * nominal.cost  # most of it is damping
+    best = screen(nominal, candidates, segments)[0]
+    assert best.candidate.place == "elbow"
+    assert best.share > 0.5 * screen(alone, candidates, segments)[0].share
 
 
 def test_a_limit_is_looked_for_on_its_own_grid(tmp_path: Path) -> None:
