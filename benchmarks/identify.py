@@ -2,7 +2,8 @@
 
 The protocol is in ``identification/protocol.py``; every finished data set is a line of
 ``runs/identify-COMMIT.jsonl``, so that a second call goes on. All of it takes hours; a share, or
-what is done in so many minutes: ``python -m benchmarks.identify --share 0.05 --minutes 30``.
+what is done in so many minutes: ``python -m benchmarks.identify --share 0.05 --minutes 30``, and
+with ``--skip`` others than those that code was mended by.
 """
 
 import argparse
@@ -39,7 +40,7 @@ def default_path() -> Path:
 
 def measured(
     path: Path, share: float, processes: int = PROCESSES, minutes: float | None = None,
-    baselines_every: int = BASELINES_EVERY,
+    baselines_every: int = BASELINES_EVERY, skipped: int = 0,
 ) -> Measurement:  # fmt: skip
     """Run a share of the protocol, or go on with it; 0 is the smoke test.
 
@@ -49,13 +50,14 @@ def measured(
         processes: how many at once.
         minutes: after which no data set is begun; None for as long as it takes.
         baselines_every: on every so many data sets the baselines run, too; 0: on none.
+        skipped: so many data sets of the order are left out.
 
     Raises:
         RiposteError: no single effect was looked for in that time.
     """
     trials = protocol(share) if share else smoke()
     every = baselines_every if share else 0
-    records = run(trials, path, every, processes, minutes)
+    records = run(trials, path, every, processes, minutes, skipped)
     first, *others = checks_of(records)
     if not first.name.startswith("right effect"):
         raise RiposteError(f"no data set with one effect was done, of {len(records)}")
@@ -85,6 +87,10 @@ def main() -> int:
         "--baselines-every", type=int, default=BASELINES_EVERY, metavar="N",
         help="data sets; slow on a PR2, 0 for none (%(default)s)",
     )  # fmt: skip
+    parser.add_argument(
+        "--skip", type=int, default=0, metavar="N",
+        help="data sets of the order to leave out, which earlier rows are of (%(default)s)",
+    )  # fmt: skip
     parser.add_argument("--write", action="store_true", help=f"add a row to benchmarks/{RESULTS}")
     found = parser.parse_args()
     if not 0.0 < found.share <= 1.0 or found.processes < 1:
@@ -94,10 +100,14 @@ def main() -> int:
     if found.baselines_every < 0:
         parser.error("--baselines-every is at least 0")
 
+    if found.skip < 0:
+        parser.error("--skip is at least 0")
+
     def share() -> Measurement:
         return measured(
-            found.out, found.share, found.processes, found.minutes, found.baselines_every
-        )
+            found.out, found.share, found.processes, found.minutes, found.baselines_every,
+            found.skip,
+        )  # fmt: skip
 
     try:
         report = report_of("identify", share, smoke=False)

@@ -47,6 +47,7 @@ def run(
     baselines_every: int,
     processes: int = PROCESSES,
     minutes: float | None = None,
+    skipped: int = 0,
 ) -> list[dict[str, Any]]:
     """Return the records of all trials that are done, those done before included.
 
@@ -58,12 +59,14 @@ def run(
         baselines_every: on every so many data sets the baselines run, too; 0: on none.
         processes: how many at once.
         minutes: after which no trial is begun; None for as long as it takes.
+        skipped: so many of the first are left out: those that code was mended by.
     """
+    trials = by_turns(trials)[skipped:]
     ends_at = None if minutes is None else SystemClock().now() + 60.0 * minutes
     done = {record["key"] for record in finished(path)}
     left = [
         (trial, bool(baselines_every) and number % baselines_every == 0, ends_at)
-        for number, trial in enumerate(by_turns(trials))
+        for number, trial in enumerate(trials)
         if trial.key not in done
     ]
     path.parent.mkdir(parents=True, exist_ok=True)

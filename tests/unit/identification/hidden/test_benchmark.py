@@ -83,6 +83,14 @@ def test_no_trial_is_begun_after_the_time_is_up(tmp_path):
     assert [each["key"] for each in found] == [protocol(0.05)[3].key]
 
 
+def test_data_sets_that_earlier_rows_are_of_can_be_left_out(tmp_path):
+    path = tmp_path / "records.jsonl"
+    order = by_turns(protocol(0.05))
+    path.write_text("".join(json.dumps(record(key=each.key)) + "\n" for each in order[:4]))
+    found = run(protocol(0.05), path, 0, processes=1, minutes=0.0, skipped=3)
+    assert [each["key"] for each in found] == [order[3].key]
+
+
 def test_rates_of_the_table_are_those_of_the_records():
     hidden = [effect("payload")]
     records = [
