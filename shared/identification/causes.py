@@ -3,7 +3,7 @@
 from shared.identification.certainty import CALIBRATED, half_widths
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
-from shared.identification.searched import Search, Tried
+from shared.identification.searched import Search, Tried, cosine
 from shared.identification.sentence import label
 from shared.identification.verdict import Cause, Interval, Tie
 
@@ -66,17 +66,10 @@ def ties_of(found: Search, causes: tuple[Cause, ...]) -> tuple[Tie, ...]:
         if not rivals:
             continue
         others = tuple(rival(found, each, base) for each in rivals)
-        alike = min(_cosine(tried, each) for each in rivals)
+        alike = min(cosine(tried, each) for each in rivals)
         names = [label(cause), *map(label, others)]
         out.append(Tie(causes=(cause, *others), alike=alike, record=motion(tried, rivals, names)))
     return tuple(out)
-
-
-def _cosine(one: Tried, other: Tried) -> float:
-    first, second = one.screened.signature, other.screened.signature
-    if first.size == 0 or second.size == 0:
-        return 0.0
-    return abs(float(first @ second))
 
 
 def motion(tried: Tried, rivals: tuple[Tried, ...], names: list[str]) -> str:

@@ -12,7 +12,17 @@ from shared.identification.gate import LEAST_SHARE, compare, floor_of, stretches
 from shared.identification.look import look
 from shared.identification.progress import Progress
 from shared.identification.refit import settle
-from shared.identification.searched import ALIKE, Model, Search, Tried, judged, so_far
+from shared.identification.searched import (
+    ALIKE,
+    STANDS_OUT,
+    TAKEN_AWAY,
+    Model,
+    Search,
+    Tried,
+    cosine,
+    judged,
+    so_far,
+)
 from shared.identification.space import Space
 from shared.identification.turns import LATE
 
@@ -26,15 +36,13 @@ _FAR = 2.0
 """Candidates whose rough refit costs so many times the best one's get no full fit."""
 QUIET = 1.25
 """Mean square residual, in noise floors, below which no further cause is looked for."""
-_STANDS_OUT = 6.0
-"""Mean square residual of a stretch over the usual one, where something happened once."""
-_TAKEN_AWAY = 0.4
-"""Share of it that may be left by what explains it."""
 _EVENT = 4.0
 """Times the mean square residual of the usual stretch that one counts with at most, between causes:
 what happened once would be most of the mean, and most of its error."""
 _NEARLY = 0.05
 """Of the cost on what was fitted to: by so much two causes that hardly differ may be apart."""
+_APART = 0.5
+"""Cosine of what two causes explain, up to which three quarters of it are not the same."""
 _LOADS = {"counterbalance", "torque_bias"}
 """Causes of which neither is told from the other by a few postures: near one of them a load that
 depends on posture is a constant torque, whatever numbers either has."""
@@ -101,11 +109,7 @@ def _round(
     if not useful:
         return False
     best, rivals = _simplest(_sure(useful, train), found.rng)
-    rivals = tuple(
-        one
-        for one in rivals
-        if one.candidate.effect.name in LATE or not _adds(found, best, one, train, test)
-    )
+    rivals = tuple(one for one in rivals if _is_rival(found, best, one, train, test))
     fit = polish(best.fit.space, best.fit.z, train, 4, enough=1e-4)
     losses = stretches(found.problem, fit.space.variant(fit.z), test)
     gain, fitted = judged(found, best.candidate, so_far(found), Model(fit, losses))
@@ -186,9 +190,9 @@ def _explains_event(found: Search, candidate: Candidate, fit: Fit, train: tuple[
     worst = int(np.argmax(before - after))
     usual = max(float(np.median(before)), 1.0)
     return bool(
-        before[worst] > _STANDS_OUT * usual
-        and after[worst] < _TAKEN_AWAY * before[worst]
-        and after.max() < max(_TAKEN_AWAY * before.max(), _STANDS_OUT * usual)
+        before[worst] > STANDS_OUT * usual
+        and after[worst] < TAKEN_AWAY * before[worst]
+        and after.max() < max(TAKEN_AWAY * before.max(), STANDS_OUT * usual)
     )
 
 
@@ -242,6 +246,19 @@ def _is_alike(
     """Return whether the recordings do not prefer the best surely."""
     margin = compare(left[other.candidate], left[best.candidate], rng)
     return margin.gain < max(margin.error, ALIKE * best.gain.gain)
+
+
+def _is_rival(
+    found: Search, best: Tried, other: Tried, train: tuple[int, ...], test: tuple[int, ...]
+) -> bool:
+    """Return whether a cause that does as well may stand in the place of the best.
+
+    Not one that explains something else as well, friction of another joint: that is a cause beside
+    it, to be found in its turn.
+    """
+    if other.candidate.effect.name in LATE:
+        return True
+    return cosine(best, other) > _APART and not _adds(found, best, other, train, test)
 
 
 def _adds(

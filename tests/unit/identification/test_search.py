@@ -23,6 +23,7 @@ from shared.identification.hidden.generator import hide
 from shared.identification.hidden.recipe import Recipe, wish_of
 from shared.identification.progress import silent
 from shared.identification.search import (
+    _is_rival,  # pyright: ignore[reportPrivateUsage]
     _simplest,  # pyright: ignore[reportPrivateUsage]
     _sure,  # pyright: ignore[reportPrivateUsage]
     search,
@@ -131,6 +132,17 @@ def test_a_counterbalance_and_a_constant_torque_are_rivals_unless_one_does_surel
     taken, rivals = _simplest(list(better), np.random.default_rng(0))
     assert taken is better[1]
     assert [one.candidate for one in rivals] == [ELBOW]
+
+
+def test_what_explains_something_else_as_well_is_no_rival(searches: Searches):
+    found, (train, test) = searches.search(_BAD), map(searches.problem.of, ("train", "test"))
+    one = searches.tried(ELBOW, _BAD[:4], _GOOD[:4])  # stretches of what is held out
+    other = searches.tried(LIFT, _BAD[:4], _GOOD[:4])
+    assert _is_rival(found, one, other, train, test)
+    apart = replace(other, screened=replace(other.screened, signature=np.array([0.3, 0.95])))
+    assert not _is_rival(found, one, apart, train, test)
+    turns = replace(apart.screened, candidate=Candidate(TURNS, ""))
+    assert _is_rival(found, one, replace(apart, screened=turns), train, test)
 
 
 @pytest.mark.parametrize(("more", "cost"), [(0.02, 1.0), (0.0, 1.2)])
