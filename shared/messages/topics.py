@@ -125,7 +125,8 @@ ROLLOUT = Service(
 )
 RESULTS = Service(
     "league/results", BoutResults, Receipt, 1 * MIB, 4 * KIB, ("actor",), "league",
-    "finished bouts; acknowledged when they are in the ledger", acked=True,
+    "finished bouts, those of one pair of players together; "
+    "acknowledged when they are in the ledger", acked=True,
 )
 VERSION = Service(
     "league/version", VersionReport, VersionReceipt, 8 * MIB, 1 * MIB, ("learner",), "league",
