@@ -8,7 +8,7 @@ turns, all processes on the same two cores, so that what the others need is part
 import os
 from typing import Any
 
-from benchmarks.harness import interleaved, median
+from benchmarks.harness import interleaved, median, on_cores
 from benchmarks.training_run import ENDLESS, UNTAUGHT, training_run
 from services.jobs.bench import Check, Measurement
 
@@ -38,13 +38,10 @@ def measure(smoke: bool) -> Measurement:
     """Return two actors' samples a second over twice those of one."""
     seconds, rounds = (1.0, 1) if smoke else (15.0, 5)
     cores = sorted(os.sched_getaffinity(0))
-    os.sched_setaffinity(0, cores[:CORES])
-    try:
+    with on_cores(*cores[:CORES]):
         turns = interleaved(
             rounds, [lambda count=count: run_once(count, seconds) for count in ACTORS]
         )
-    finally:
-        os.sched_setaffinity(0, cores)
     runs = tuple(
         {f"{name}, {count}": value for count, seen in zip(ACTORS, turn, strict=True)
          for name, value in seen.items()}
@@ -62,13 +59,13 @@ def measure(smoke: bool) -> Measurement:
                   value=median(runs, "samples_per_actor_cpu_s, 2")
                   / median(runs, "samples_per_actor_cpu_s, 1")),
             *(
-                Check(name=f"{name}, {count}", value=median(runs, f"{key}, {count}"), unit=unit)
+                Check(name=f"{name}, {count}", value=median(runs, f"{key}, {count}"))
                 for count in ACTORS
-                for name, key, unit in (
-                    ("samples/s, actors", "samples_per_s", ""),
-                    ("cores of the actors", "actors", ""),
-                    ("cores of all others", "others", ""),
-                    ("cores our processes waited for", "waited", ""),
+                for name, key in (
+                    ("samples/s, actors", "samples_per_s"),
+                    ("cores of the actors", "actors"),
+                    ("cores of all others", "others"),
+                    ("cores our processes waited for", "waited"),
                 )
             ),
         ),

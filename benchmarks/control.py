@@ -21,7 +21,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from benchmarks.harness import process
+from benchmarks.harness import on_cores, process
 from benchmarks.training_run import ENDLESS, WARM_VERSION, TrainingRun, training_run
 from services.jobs.bench import Check, Measurement, report_of, text_of
 from services.jobs.play.match import Match, Terms
@@ -153,17 +153,6 @@ def _terms(plan: Plan) -> Terms:
         antagonist=plan.antagonist.reference, protagonist=plan.protagonist.reference, bouts=0,
         arms=True, starts=True, rest=0.0, patience=3600.0, operator="bench", again="",
     )  # fmt: skip
-
-
-@contextlib.contextmanager
-def on_cores(*cores: int) -> Iterator[None]:
-    """Let what is started in the block run on these cores only."""
-    before = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, set(cores))
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, before)
 
 
 @contextlib.contextmanager

@@ -56,3 +56,14 @@ def process(*args: str) -> Iterator[subprocess.Popen[str]]:
         started.wait()
         if started.stdout:
             started.stdout.close()
+
+
+@contextlib.contextmanager
+def on_cores(*cores: int) -> Iterator[None]:
+    """Let what is started in the block run on these cores only."""
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, set(cores))
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)

@@ -99,7 +99,6 @@ def main() -> int:
         parser.error("--minutes is over 0")
     if found.baselines_every < 0:
         parser.error("--baselines-every is at least 0")
-
     if found.skip < 0:
         parser.error("--skip is at least 0")
 

@@ -19,8 +19,8 @@ import msgspec
 import numpy as np
 import psutil
 
-from benchmarks.control import Site, live_site, on_cores
-from benchmarks.harness import ROOT
+from benchmarks.control import Site, live_site
+from benchmarks.harness import ROOT, on_cores
 from benchmarks.soaking import page
 from benchmarks.soaking.samples import Ended, Sample, Started, disk_use, read, use_of
 from benchmarks.soaking.verdict import Verdict, judge
