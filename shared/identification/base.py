@@ -14,10 +14,14 @@ import numpy as np
 
 from shared.identification.dataset.types import Float64
 from shared.identification.subject import Subject
+from shared.sim.plant.kinematics import turned_axes
 from shared.sim.plant.row import Row, drives_of
 
 INERTIA_PRIOR = 0.1
-"""Standard deviation of what is known of a link's mass and inertia (1)."""
+"""Standard deviation of what is known of a link's mass and inertia (1), and, in units of
+``_CENTRE``, of where its centre of mass is: 5 mm, cables and screws."""
+_CENTRE = 0.05
+"""(m)."""
 _LOOSE = 1.5
 """Of damping, armature and gains: a factor of 4.5 either way is unlikely."""
 _MOST_FRICTION = 30.0
@@ -187,7 +191,42 @@ def _inertias(subject: Subject) -> list[BaseParameter]:
                     change=_mass_setter(body),
                 )
             )
+            found += _centres(subject, label, body)
     return found
+
+
+def _centres(subject: Subject, label: str, body: int) -> list[BaseParameter]:
+    """Return where the centre of mass of a link is, along its body's axes.
+
+    Only where motors do not hold the arm to a command: elsewhere it is lost in what they hold.
+    Along an axis that every hinge before it turns about it is not felt.
+    """
+    if subject.control != "torque":
+        return []
+    model = subject.nominal.model
+    is_turned = turned_axes(model, body)
+    return [
+        BaseParameter(
+            name=f"centre_{word} {label}",
+            unit="m",
+            nominal=float(model.body_ipos[body, index]),
+            is_factor=False,
+            scale=_CENTRE,
+            low=-1.0,
+            high=1.0,
+            prior=INERTIA_PRIOR,
+            change=_centre_setter(body, index),
+        )
+        for index, word in enumerate("xyz")
+        if is_turned[index]
+    ]
+
+
+def _centre_setter(body: int, index: int) -> Callable[[Row, float], None]:
+    def change(row: Row, value: float) -> None:
+        row.field("body_ipos")[body, index] = value
+
+    return change
 
 
 def _mass_setter(body: int) -> Callable[[Row, float], None]:

@@ -64,12 +64,7 @@ class Subject:
 
     @functools.cached_property
     def starts(self) -> Starts:
-        """Return what repeats differ by for starting elsewhere than what they repeat.
-
-        Nothing under torque control: an arm that nothing holds drifts off, in a model, too.
-        """
-        if self.control == "torque":
-            return {}
+        """Return what repeats differ by for starting elsewhere than what they repeat."""
         replayed = _replayed(self.recordings)
         recorded = list(zip(self.recordings, replayed, strict=True))
         return starts_apart(self.nominal, recorded, CUTS.get(self.control))

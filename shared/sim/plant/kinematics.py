@@ -10,6 +10,9 @@ from shared.sim.plant.plant import TOOL, Plant
 from shared.sim.plant.poses import conjugate, cross, inverse, product, rotated, seen_from
 
 _XBODY = int(mujoco.mjtObj.mjOBJ_XBODY)
+_HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+_PARALLEL = 0.999
+"""Cosine of the angle between lines that are taken to be parallel."""
 
 
 def tool_poses(plant: Plant, model: mujoco.MjModel, q: Float64) -> Float64:
@@ -45,6 +48,19 @@ def tool_motion(plant: Plant, model: mujoco.MjModel, q: Float64) -> tuple[Float6
     parts = [rotated(back, jacobian[:, :, part]) for part in (slice(0, 3), slice(3, 6))]
     seen = seen_from(inverse(at.base), at.tool)
     return seen, np.concatenate(parts, axis=2).swapaxes(1, 2)
+
+
+def turned_axes(model: mujoco.MjModel, body: int) -> list[bool]:
+    """Return for x, y and z of a body whether a hinge that moves it turns about another line."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    hinges = [
+        joint
+        for joint in range(model.njnt)
+        if model.jnt_type[joint] == _HINGE and _carries(model, int(model.jnt_bodyid[joint]), body)
+    ]
+    along = np.abs(data.xaxis[hinges] @ data.xmat[body].reshape(3, 3))
+    return [bool(each) for each in (along < _PARALLEL).any(axis=0)]
 
 
 @dataclass(frozen=True)

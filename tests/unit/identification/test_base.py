@@ -8,6 +8,7 @@ import pytest
 from shared.identification.base import base_parameters, enter_base
 from shared.identification.catalogue.joint_elasticity import EFFECT as ELASTICITY
 from shared.identification.subject import Subject
+from shared.sim.hidden.arms import ARMS
 from shared.sim.plant.plant import mjcf
 from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.row import Row
@@ -118,3 +119,24 @@ def test_friction_that_a_model_lacks_is_no_parameter(tmp_path: Path):
     subject = make_subject(mjcf(path, "position", JOINTS, JOINTS, "tool"))
     names = [each.name for each in base_parameters(subject)]
     assert [name for name in names if "friction" in name] == ["friction_loss elbow"]
+
+
+def test_of_an_arm_driven_by_torques_the_links_centres_of_mass_are_free_but_known():
+    subject = make_subject(ARMS["torque2"].make())
+    found = {each.name: each for each in base_parameters(subject) if "centre" in each.name}
+    # both hinges turn about y, along which nothing is felt
+    assert list(found) == [f"centre_{axis} {joint}" for joint in subject.joints for axis in "xz"]
+    elbow = found["centre_z elbow"]
+    assert elbow.value(0.0) == pytest.approx(-0.13)
+    assert elbow.value(elbow.prior) == pytest.approx(-0.125)
+    row = subject.nominal.entered(lambda row: elbow.change(row, -0.2), recorded(_COMMAND[:2], 0.1))
+    assert row.field("body_ipos")[row.body_of("elbow")].tolist() == [0.0, 0.0, -0.2]
+
+
+def test_a_rail_does_not_feel_where_its_carriage_is_heavy(tmp_path: Path):
+    arm = ARMS["torque2"]
+    assert arm.file is not None
+    path = tmp_path / "rail.xml"
+    path.write_text(arm.file.read_text().replace('axis="0 1 0"', 'type="slide" axis="1 0 0"'))
+    subject = make_subject(mjcf(path, "torque", arm.joints, arm.joints, arm.tracked))
+    assert not [each for each in base_parameters(subject) if "centre" in each.name]

@@ -1,14 +1,16 @@
 """Repeats that start in another state than what they repeat."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from shared.identification.base import base_parameters
 from shared.identification.dataset.types import Dataset
+from shared.identification.hidden.generator import hide
+from shared.identification.hidden.recipe import Recipe
 from shared.identification.noise import noise_of, repeat_differences
-from shared.identification.problem import BLOCK
+from shared.identification.problem import BLOCK, Problem, Variant
 from shared.identification.subject import subject_of
 from tests.measured import JOINT_NOISE, TRACKER_NOISE, measure
 
@@ -50,8 +52,14 @@ def test_the_floor_of_a_data_set_is_that_of_its_readings(elsewhere: Dataset):
     assert found.joints == pytest.approx(np.full(3, JOINT_NOISE / np.sqrt(2.0)), rel=0.2)
 
 
-def test_an_arm_that_nothing_holds_is_not_corrected(elsewhere: Dataset):
-    torque = replace(elsewhere, control="torque", actuators=elsewhere.actuators)
-    subject = subject_of(torque)
-    assert subject.control == "torque"
-    assert subject.starts == {}
+def test_repeats_of_an_arm_that_nothing_holds_are_compared_part_by_part(tmp_path: Path):
+    recipe = Recipe(arm="torque2", seed=9670, spread=0.0, seconds=4.0)
+    dataset = hide(tmp_path / "set", recipe)
+    subject = subject_of(dataset)
+    raw, corrected = (noise_of(dataset, BLOCK, starts) for starts in ({}, subject.starts))
+    assert (corrected.joints < 0.5 * raw.joints).all()
+    # nothing is wrong with the model: what it leaves is noise
+    problem = Problem(subject, dataset, base_parameters(subject), corrected)
+    right = Variant(np.zeros(len(problem.parameters)))
+    left = problem.vector([right], problem.of("test"))
+    assert np.mean(left**2) == pytest.approx(1.0, abs=0.3)

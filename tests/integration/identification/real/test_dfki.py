@@ -31,18 +31,18 @@ def dry(problem: Problem) -> Fitted:
 def test_both_joints_rub(problem: Problem, dry: Fitted):
     """A fit with all masses as the authors have them gives 0.21 and 0.20 N m."""
     plain = fitted(problem)
-    assert dry.values["coulomb_friction shoulder"][0] == pytest.approx(0.236, abs=0.015)
-    assert dry.values["coulomb_friction elbow"][0] == pytest.approx(0.189, abs=0.01)
-    assert plain.test == pytest.approx(0.1514, abs=0.004)  # rad in windows of 0.3 s
-    assert dry.test == pytest.approx(0.0297, abs=0.0015)
+    assert dry.values["coulomb_friction shoulder"][0] == pytest.approx(0.222, abs=0.01)
+    assert dry.values["coulomb_friction elbow"][0] == pytest.approx(0.200, abs=0.01)
+    assert plain.test == pytest.approx(0.1438, abs=0.004)  # rad in windows of 0.3 s
+    assert dry.test == pytest.approx(0.0275, abs=0.0015)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_viscous_friction_fits_but_fails_on_what_was_held_out(problem: Problem, dry: Fitted):
     damped = fitted(problem, "viscous_friction")
-    assert damped.train == pytest.approx(0.0501, abs=0.003)
-    assert damped.test == pytest.approx(0.1231, abs=0.006)
+    assert damped.train == pytest.approx(0.0465, abs=0.003)
+    assert damped.test == pytest.approx(0.1212, abs=0.006)
     assert damped.test > 4.0 * dry.test
 
 
