@@ -9,6 +9,7 @@ import numpy as np
 
 from shared.config.site import nearest
 from shared.errors import IdentificationError, SimulationError
+from shared.identification.dataset.types import Split
 from shared.identification.hidden.recipe import Recipe, Wish
 from shared.identification.hidden.recording import Plan
 from shared.identification.hidden.sizing import Yardstick
@@ -19,6 +20,8 @@ from shared.sim.hidden.robot import Robot
 
 _DRAWS: Final = 12
 """Times that an effect is drawn anew which does not show enough."""
+_SHOWN: Final = 0.1
+"""Of its power in held-out recordings, that an effect has to have in those to fit to."""
 _ONCE: Final = ("external_contact", "tracker_slip")
 """Events: they are sized on the recordings to fit to."""
 
@@ -49,6 +52,9 @@ class Chosen:
     case: Case
     share: float | None
     """Of the residual, that it makes; None where it was not measured."""
+    is_shown: bool
+    """Whether the recordings to fit to show it, too: a drive's limit that only held-out motion
+    reaches nobody can find."""
 
 
 def choose(factory: Factory, made: Sequence[Plan], rng: np.random.Generator) -> tuple[Chosen, ...]:
@@ -86,7 +92,8 @@ def choose(factory: Factory, made: Sequence[Plan], rng: np.random.Generator) -> 
 
 
 def _shows(recipe: Recipe, chosen: Chosen) -> bool:
-    return chosen.share is None or chosen.share >= 0.5 * recipe.shares[0]
+    is_much = chosen.share is None or chosen.share >= 0.5 * recipe.shares[0]
+    return is_much and chosen.is_shown
 
 
 def _fulfilled(factory: Factory, rulers: "_Rulers", wish: Wish, rng: np.random.Generator) -> Chosen:
@@ -109,7 +116,10 @@ class _Rulers:
 
     def of(self, name: str) -> Yardstick:
         """Return the yardstick for an effect."""
-        split = "train" if name in _ONCE else "test"
+        return self.on("train" if name in _ONCE else "test")
+
+    def on(self, split: Split) -> Yardstick:
+        """Return the yardstick on the recordings of a split."""
         if split not in self._made:
             factory = self._factory
             chosen = [plan for plan in self._plans if plan.split == split and not plan.repeats]
@@ -135,19 +145,20 @@ def _drawn(factory: Factory, rulers: _Rulers, wish: Wish, rng: np.random.Generat
     def make(size: float) -> Robot:
         return factory.make([Case(wish.name, factory.scene, place, size, shape)])
 
-    size, share = wish.size, None
+    size, share, is_shown = wish.size, None, True
     if size is None:
         low, high = hidden.sizes(factory.scene, place)
         size = rulers.of(wish.name).size_for(power / (1.0 + power), low, high, make)
     if wish.size is None or recipe.has_shares:
         try:
             found = rulers.of(wish.name).power(make(size))
+            raw = rulers.on("train").raw_power(make(size))
         except SimulationError as error:
             raise IdentificationError(
                 f"{wish.name} of size {size:g} is too much: {error}"
             ) from None
-        share = found / (1.0 + found)
-    return Chosen(hidden, Case(wish.name, factory.scene, place, size, shape), share)
+        share, is_shown = found / (1.0 + found), raw >= _SHOWN * found
+    return Chosen(hidden, Case(wish.name, factory.scene, place, size, shape), share, is_shown)
 
 
 def _places(hidden: Hidden, scene: Scene) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ base parameters change. Its mean square over the same plus 1, the noise, is the 
 residual that there is to explain.
 """
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -41,19 +42,27 @@ class Yardstick:
         plain = self.base()
         self._usual = [play(plain, self.arm, plan, None) for plan in self.plans]
         self._floors = self._noise(plain)
+
+    @functools.cached_property
+    def _basis(self) -> Float64:
+        """Return float64[M, n], orthonormal: what small steps of the base change."""
         columns: list[Float64] = []
         for change in spread.directions(self.arm):
             robot = self.base()
             change(robot)
             columns.append(self._difference(robot))
-        self._basis, sizes, _ = np.linalg.svd(np.stack(columns, axis=1), full_matrices=False)
-        self._basis = self._basis[:, sizes > 1e-6 * sizes[0]]
+        basis, sizes, _ = np.linalg.svd(np.stack(columns, axis=1), full_matrices=False)
+        return np.asarray(basis[:, sizes > 1e-6 * sizes[0]], np.float64)
 
     def power(self, robot: Robot) -> float:
         """Return the mean square, in noise floors, of what a robot does differently."""
         found = self._difference(robot)
         found = found - self._basis @ (self._basis.T @ found)
         return float(np.mean(found**2))
+
+    def raw_power(self, robot: Robot) -> float:
+        """Return the same with what a base fit makes up for."""
+        return float(np.mean(self._difference(robot) ** 2))
 
     def size_for(
         self, share: float, low: float, high: float, make: Callable[[float], Robot]

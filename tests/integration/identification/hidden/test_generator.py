@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import msgspec
 import numpy as np
 import pytest
@@ -76,6 +78,16 @@ def test_random_effects_are_different_ones_and_show_in_the_range_asked_for():
 def test_a_size_is_found_for_the_share_asked_for():
     _, truth = simulated(small(arm="arm3", wishes=(Wish("payload"),), shares=(0.5, 0.5)))
     assert truth.effect[0].share == pytest.approx(0.5, abs=0.03)
+
+
+def test_what_is_hidden_shows_in_the_recordings_to_fit_to():
+    """The first drawn, a limit at the elbow, only the fastest held-out swing reaches."""
+    recipe = Recipe(arm="arm3", seed=9500, shares=(0.4, 0.95), wishes=(Wish("torque_saturation"),))
+    limited, usual = (simulated(each)[0] for each in (recipe, replace(recipe, wishes=())))
+    power = {"train": [], "test": []}
+    for one, other in zip(limited.trajectories, usual.trajectories, strict=True):
+        power[one.split].append(np.mean((one.q - other.q) ** 2))
+    assert np.mean(power["train"]) > 0.1 * np.mean(power["test"])
 
 
 def test_what_cannot_be_is_refused_with_what_can():
