@@ -25,6 +25,9 @@ BALANCE = "riposte/centred"
 """Body at the tool under a pose controller, without mass until damping is centred."""
 _AGENT = AGENTS[1]
 _JOINTS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+_OFF = mujoco.mjtDisableBit
+_ALONE = int(_OFF.mjDSBL_CONTACT) | int(_OFF.mjDSBL_AUTORESET) | int(_OFF.mjDSBL_ISLAND)
+"""Nothing touches one arm, and looking for that, or for islands of it, is a quarter of a step."""
 PR2_TIMESTEP = 0.0025
 """Of identification, where training takes 10 ms (s)."""
 
@@ -76,6 +79,7 @@ def pr2(
         spec = build_spec(cfg, values, (_AGENT,))
         for sensor in list(spec.sensors):
             spec.delete(sensor)
+        spec.option.disableflags |= _ALONE
         _track(spec, mujoco.mjtObj.mjOBJ_SITE, f"{_AGENT}/tool", f"{_AGENT}/torso")
         tool = spec.site(f"{_AGENT}/tool")
         tool.parent.add_body(name=BALANCE, pos=tool.pos)
@@ -169,8 +173,7 @@ def mjcf(
                 motor = spec.add_actuator(name=name, target=name)
                 motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
                 motor.set_to_motor()
-        spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-        spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+        spec.option.disableflags |= _ALONE
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         _track(spec, kind, tracked or tool, "")
         return spec
