@@ -249,8 +249,15 @@ def diagnostics(evidence: Evidence) -> list[Picture]:
 
 
 def base(verdict: Verdict) -> Picture | None:
-    """Return the base parameters that moved most, as multiples of nominal; None without any."""
-    rows = [row for row in verdict.base if row.nominal > 0 and min(row.base_fit, row.extended) > 0]
+    """Return the base parameters that moved most, as multiples of nominal; None without any.
+
+    Where a centre of mass is has no such multiple: from 1 mm to 4 mm is not far.
+    """
+    rows = [
+        row
+        for row in verdict.base
+        if row.nominal > 0 and min(row.base_fit, row.extended) > 0 and row.unit != "m"
+    ]
     rows = sorted(rows, key=_moved, reverse=True)[:MOST_PARAMETERS]
     if not rows:
         return None
