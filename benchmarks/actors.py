@@ -5,10 +5,9 @@ acknowledges them and writes versions, which teach nothing. Runs with one and wi
 turns, all processes on the same two cores, so that what the others need is part of the answer.
 """
 
-import os
 from typing import Any
 
-from benchmarks.harness import interleaved, median, on_cores
+from benchmarks.harness import interleaved, median, on_first_cores
 from benchmarks.training_run import ENDLESS, UNTAUGHT, training_run
 from services.jobs.bench import Check, Measurement
 
@@ -37,8 +36,7 @@ def run_once(actors: int, seconds: float) -> dict[str, Any]:
 def measure(smoke: bool) -> Measurement:
     """Return two actors' samples a second over twice those of one."""
     seconds, rounds = (1.0, 1) if smoke else (15.0, 5)
-    cores = sorted(os.sched_getaffinity(0))
-    with on_cores(*cores[:CORES]):
+    with on_first_cores(CORES):
         turns = interleaved(
             rounds, [lambda count=count: run_once(count, seconds) for count in ACTORS]
         )

@@ -67,3 +67,8 @@ def on_cores(*cores: int) -> Iterator[None]:
         yield
     finally:
         os.sched_setaffinity(0, before)
+
+
+def on_first_cores(count: int) -> contextlib.AbstractContextManager[None]:
+    """Return :func:`on_cores` of the first ones that this process may use."""
+    return on_cores(*sorted(os.sched_getaffinity(0))[:count])

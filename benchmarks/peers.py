@@ -5,7 +5,6 @@ the first run, and trains the antagonist against a frozen fresh protagonist, as 
 the fastest mode is taken: all of them are tried for a shorter window first. Rounds are interleaved.
 """
 
-import os
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -15,7 +14,7 @@ from typing import Any
 import msgspec
 
 from benchmarks.environments import CannotInstallError, interpreter, size_mib
-from benchmarks.harness import interleaved, median
+from benchmarks.harness import interleaved, median, on_first_cores
 from benchmarks.peer_loops.running import Peer, PeerFailedError, fresh_protagonist, run, work_of
 from benchmarks.train import RUNNERS, ours
 from services.jobs.bench import Check, Measurement
@@ -81,22 +80,17 @@ def _line(figures: dict[str, Any]) -> str:
 
 def measure(smoke: bool) -> Measurement:
     """Return our training speed beside every peer's fastest mode."""
-    cores = sorted(os.sched_getaffinity(0))
-    os.sched_setaffinity(0, cores[:2])
     seconds, rounds = (1.0, 1) if smoke else (25.0, 3)
     settings = Settings.load(None)
-    try:
-        with tempfile.TemporaryDirectory(prefix="riposte-peers-") as folder:
-            opponent = fresh_protagonist(settings, Path(folder) / "opponent.safetensors")
-            found = list(fastest(settings, opponent, min(seconds, 10.0), smoke=smoke))
+    with on_first_cores(2), tempfile.TemporaryDirectory(prefix="riposte-peers-") as folder:
+        opponent = fresh_protagonist(settings, Path(folder) / "opponent.safetensors")
+        found = list(fastest(settings, opponent, min(seconds, 10.0), smoke=smoke))
 
-            def side(peer: Peer) -> Callable[[], dict[str, Any]]:
-                return lambda: run(peer, work_of(peer, settings, opponent, seconds))
+        def side(peer: Peer) -> Callable[[], dict[str, Any]]:
+            return lambda: run(peer, work_of(peer, settings, opponent, seconds))
 
-            sides = [lambda: ours(seconds), *(side(peer) for peer, _ in found)]
-            turns = interleaved(rounds, sides)
-    finally:
-        os.sched_setaffinity(0, cores)
+        sides = [lambda: ours(seconds), *(side(peer) for peer, _ in found)]
+        turns = interleaved(rounds, sides)
     return _measurement([peer for peer, _ in found], turns, [tried for _, tried in found])
 
 

@@ -7,7 +7,6 @@ start of the process, or of the run, and stands still while a loop is measured; 
 run are measured afterwards. Interquartile means over the seeds, with 95 % bootstrap intervals.
 """
 
-import os
 import sys
 import tempfile
 import time
@@ -18,6 +17,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from benchmarks.harness import on_first_cores
 from benchmarks.peer_loops.running import Peer, fresh_protagonist, run, work_of
 from benchmarks.peer_loops.skill import EVERY, MOST_UPDATES, Act, share_in_target
 from benchmarks.seeds import Interval, iqm_interval, ratio_interval
@@ -92,24 +92,19 @@ def _player(folder: Path, snapshot: str) -> Act:
 
 def measure(smoke: bool) -> Measurement:
     """Return our time to the skill beside that of the loops."""
-    cores = sorted(os.sched_getaffinity(0))
-    os.sched_setaffinity(0, cores[:2])
     settings = Settings.load(None)
     seeds, updates = (1, 2 * EVERY) if smoke else (SEEDS, MOST_UPDATES)
     skill = 1e-9 if smoke else SKILL
     peers = PEERS[:1] if smoke else PEERS
     races: list[dict[str, Any]] = []
-    try:
-        with tempfile.TemporaryDirectory(prefix="riposte-skill-") as folder:
-            opponent = fresh_protagonist(settings, Path(folder) / "opponent.safetensors")
-            for seed in range(seeds):
-                _add(races, seed, ours(seed, updates))
-                for peer in peers:
-                    work = work_of(peer, settings, opponent, RUN_SECONDS)
-                    work = msgspec.structs.replace(work, seed=seed, skill=skill)
-                    _add(races, seed, run(peer, work))
-    finally:
-        os.sched_setaffinity(0, cores)
+    with on_first_cores(2), tempfile.TemporaryDirectory(prefix="riposte-skill-") as folder:
+        opponent = fresh_protagonist(settings, Path(folder) / "opponent.safetensors")
+        for seed in range(seeds):
+            _add(races, seed, ours(seed, updates))
+            for peer in peers:
+                work = work_of(peer, settings, opponent, RUN_SECONDS)
+                work = msgspec.structs.replace(work, seed=seed, skill=skill)
+                _add(races, seed, run(peer, work))
     if not smoke and not any(race["skill"] >= SKILL for race in races):
         raise RiposteError(f"nobody was in the target for {SKILL:.0%}: nothing to compare")
     return _measurement(races, [peer.name for peer in peers])

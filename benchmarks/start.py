@@ -7,7 +7,6 @@ model, session), memory what is resident once the run has learned for a while, r
 import contextlib
 import datetime
 import json
-import os
 import shutil
 import signal
 import statistics
@@ -21,7 +20,7 @@ from typing import Any
 
 import psutil
 
-from benchmarks.harness import ROOT, median
+from benchmarks.harness import ROOT, median, on_first_cores
 from services.jobs.bench import Check, Measurement
 from services.jobs.runs import state_of
 from shared.errors import ConfigError, LedgerError, RiposteError
@@ -138,10 +137,8 @@ def _logged_at(folder: Path, name: str, events: Sequence[str]) -> float:
 def measure(smoke: bool) -> Measurement:
     """Return seconds to the first update, and start-up and memory of each process."""
     helps = [help_seconds() for _ in range(2 if smoke else 10)]
-    cores = sorted(os.sched_getaffinity(0))
-    os.sched_setaffinity(0, cores[:2])
-    runs = tuple(run_once(2 if smoke else 30) for _ in range(1 if smoke else 5))
-    os.sched_setaffinity(0, cores)
+    with on_first_cores(2):
+        runs = tuple(run_once(2 if smoke else 30) for _ in range(1 if smoke else 5))
 
     def middle(of: str, name: str) -> float:
         return statistics.median(run[of][name] for run in runs)

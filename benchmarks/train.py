@@ -5,12 +5,11 @@ runner gets the number of worlds and of torch threads that suits it best; the ru
 `riposte train` starts, with its recorder, but with the live page off. Rounds are interleaved.
 """
 
-import os
 import tempfile
 from pathlib import Path
 from typing import Any
 
-from benchmarks.harness import interleaved, median
+from benchmarks.harness import interleaved, median, on_first_cores
 from benchmarks.peer_loops.running import Peer, fresh_protagonist, run, work_of
 from benchmarks.training_run import training_run
 from services.jobs.bench import Check, Measurement
@@ -38,11 +37,9 @@ def ours(seconds: float) -> dict[str, Any]:
 
 def measure(smoke: bool) -> Measurement:
     """Return our training speed beside the best single process."""
-    cores = sorted(os.sched_getaffinity(0))
-    os.sched_setaffinity(0, cores[:2])
     seconds, rounds = (1.0, 1) if smoke else (25.0, 4)
     settings = Settings.load(None)
-    with tempfile.TemporaryDirectory(prefix="riposte-train-") as folder:
+    with on_first_cores(2), tempfile.TemporaryDirectory(prefix="riposte-train-") as folder:
         opponent = fresh_protagonist(settings, Path(folder) / "opponent.safetensors")
 
         def theirs(runner: Peer, seconds: float) -> dict[str, Any]:
@@ -69,7 +66,6 @@ def measure(smoke: bool) -> Measurement:
         }
         for their, our in pairs
     )
-    os.sched_setaffinity(0, cores)
     return Measurement(
         value=median(runs, "ours"),
         unit="samples/s",

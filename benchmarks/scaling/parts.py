@@ -1,12 +1,11 @@
 """What an actor and PPO cost, each alone in this process: CPU seconds, no bus."""
 
-import os
 import statistics
 
 import numpy as np
 
 from benchmarks.actor import Loop
-from benchmarks.harness import cpu_of
+from benchmarks.harness import cpu_of, on_first_cores
 from benchmarks.rollouts import rollout_of
 from benchmarks.speed import piece_seconds
 from services.learner.config import LearnerConfig
@@ -24,22 +23,20 @@ def costs(rounds: int) -> dict[str, float]:
     """
     from services.learner.ppo import PolicyOptimiser  # torch: only where PPO runs
 
-    before = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {min(before)})
-    loop = Loop(NUM_ENVS, 1)
-    optimiser = PolicyOptimiser(LearnerConfig(), 0)
-    rollouts = []
-    playing: list[float] = []
-    updating: list[float] = []
-    pieces: list[float] = []
-    while len(updating) < rounds:
-        pieces.append(piece_seconds())
-        playing.append(cpu_of(loop.play))
-        rollouts.append(rollout_of(loop.segment, loop.policy, loop.model.hash))
-        if len(rollouts) >= BATCH:
-            newest = rollouts[-BATCH:]
-            updating.append(cpu_of(lambda: optimiser.update(newest)))  # noqa: B023
-    os.sched_setaffinity(0, before)
+    with on_first_cores(1):
+        loop = Loop(NUM_ENVS, 1)
+        optimiser = PolicyOptimiser(LearnerConfig(), 0)
+        rollouts = []
+        playing: list[float] = []
+        updating: list[float] = []
+        pieces: list[float] = []
+        while len(updating) < rounds:
+            pieces.append(piece_seconds())
+            playing.append(cpu_of(loop.play))
+            rollouts.append(rollout_of(loop.segment, loop.policy, loop.model.hash))
+            if len(rollouts) >= BATCH:
+                newest = rollouts[-BATCH:]
+                updating.append(cpu_of(lambda: optimiser.update(newest)))  # noqa: B023
     samples = float(np.size(rollouts[0].rewards))
     return {
         "actor_s": statistics.median(playing) / samples,
