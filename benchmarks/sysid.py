@@ -39,7 +39,8 @@ def prepare(folder: Path) -> None:
         recording("one", "train", times, q, qd, torques),
         recording("other", "test", times, other[2], other[3], other[1]),
     )
-    write(folder / "data", model.to_xml(), JOINTS, trajectories, {}, {"source": "simulated"})
+    notes = {"source": "simulated"}
+    write(folder / "data", model.to_xml(), "torque", JOINTS, trajectories, notes)
 
 
 def fitted(python: str, module: str, data: Path) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from shared.identification.dataset.types import Float64, Split, Trajectory
-from studies.real_data.folders import recording, there, write
+from studies.real_data.folders import hashes_of, recording, there, write
 
 JOINTS = ("shoulder", "elbow")
 PARAMETERS = "params_C.1_model_1.0.yml"
@@ -39,9 +39,10 @@ def convert(out: Path, raw: Path, train: Sequence[str] = TRAIN, test: Sequence[s
     notes = {
         "source": "github.com/dfki-ric-underactuated-lab/double_pendulum at 1e8544e",
         "licence": "BSD-3-Clause",
+        "sha256": hashes_of({**paths, "parameters": parameters}),
     }
     model = _model(_parameters(parameters))
-    write(out, model, JOINTS, trajectories, {**paths, "parameters": parameters}, notes)
+    write(out, model, "torque", JOINTS, trajectories, notes)
 
 
 def _read(path: Path, name: str, split: Split) -> Trajectory:

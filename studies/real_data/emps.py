@@ -17,7 +17,7 @@ import numpy as np
 from scipy.io import loadmat
 
 from shared.identification.dataset.types import Float64, Trajectory
-from studies.real_data.folders import recording, there, write
+from studies.real_data.folders import hashes_of, recording, there, write
 
 JOINT = "carriage"
 MODEL = f"""<mujoco model="emps">
@@ -54,8 +54,9 @@ def convert(out: Path, raw: Path, pulses: Pulses = "known") -> None:
         "source": "nonlinearbenchmark.org, EMPS; Janot, Gautier, Brunot 2019",
         "licence": "none given: cite the authors",
         "pulses": pulses,
+        "sha256": hashes_of(paths),
     }
-    write(out, MODEL, (JOINT,), trajectories, paths, notes)
+    write(out, MODEL, "torque", (JOINT,), trajectories, notes)
 
 
 def _read(path: Path, name: str, pulses: Pulses) -> Trajectory:

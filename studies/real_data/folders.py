@@ -10,6 +10,7 @@ import numpy as np
 from shared.errors import IdentificationError
 from shared.identification.dataset.types import Dataset, Float64, ModelSource, Split, Trajectory
 from shared.identification.dataset.writing import write_dataset
+from shared.sim.plant.plant import Control
 
 
 def recording(
@@ -31,25 +32,29 @@ def recording(
 
 
 def write(
-    folder: Path, model: str, joints: tuple[str, ...], trajectories: tuple[Trajectory, ...],
-    raw: Mapping[str, Path], notes: Mapping[str, Any],
+    folder: Path, model: str, control: Control, joints: tuple[str, ...],
+    trajectories: tuple[Trajectory, ...], notes: Mapping[str, Any],
 ) -> None:  # fmt: skip
-    """Write recordings under torque control beside the MJCF they are compared with.
+    """Write recordings beside the MJCF they are compared with.
 
     Args:
         folder: the new data set.
         model: the MJCF's text; it becomes ``model.xml``.
+        control: what the commands are.
         joints: names, of actuators too.
         trajectories: the recordings.
-        raw: the files they were taken from, for the record.
         notes: source and licence, for people.
     """
     dataset = Dataset(
-        folder=folder, source=ModelSource("mjcf", folder / "model.xml"), control="torque",
+        folder=folder, source=ModelSource("mjcf", folder / "model.xml"), control=control,
         joints=joints, actuators=joints, trajectories=trajectories, caveats=(), hash="",
     )  # fmt: skip
-    hashes = {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in raw.items()}
-    write_dataset(dataset, folder, {**notes, "sha256": hashes}, {"model.xml": model.encode()})
+    write_dataset(dataset, folder, notes, {"model.xml": model.encode()})
+
+
+def hashes_of(raw: Mapping[str, Path]) -> dict[str, str]:
+    """Return the SHA-256 of the files that recordings were taken from, for the record."""
+    return {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in raw.items()}
 
 
 def there(folder: Path, name: str) -> Path:

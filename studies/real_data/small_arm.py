@@ -17,14 +17,8 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from shared.identification.dataset.types import (
-    Dataset,
-    Float64,
-    ModelSource,
-    Split,
-    Trajectory,
-)
-from shared.identification.dataset.writing import write_dataset
+from shared.identification.dataset.types import Float64, Split, Trajectory
+from studies.real_data.folders import write
 
 JOINTS = ("pan", "lift", "elbow", "wrist", "roll")
 _TIMESTEP: Final = 0.0005
@@ -80,15 +74,11 @@ def convert(out: Path, wrong: Wrong, seconds: float = 12.0, seed: int = 0) -> No
         _recording(name, split, servo, at, _REST + motion(at, rng), rng)
         for name, (split, motion) in _MOTIONS.items()
     )
-    dataset = Dataset(
-        folder=out, source=ModelSource("mjcf", out / "model.xml"), control="position",
-        joints=JOINTS, actuators=JOINTS, trajectories=trajectories, caveats=(), hash="",
-    )  # fmt: skip
     notes = {
         "source": "simulated", "seed": seed, "delay": wrong.delay, "load": wrong.load,
         "friction": servo.friction.tolist(), "excess": (wrong.at_rest * servo.friction).tolist(),
     }  # fmt: skip
-    write_dataset(dataset, out, notes, {"model.xml": _mjcf(_FRICTION, _KV).encode()})
+    write(out, _mjcf(_FRICTION, _KV), "position", JOINTS, trajectories, notes)
 
 
 @dataclass(frozen=True)

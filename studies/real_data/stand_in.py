@@ -16,14 +16,8 @@ from typing import Literal, get_args
 import mujoco
 import numpy as np
 
-from shared.identification.dataset.types import (
-    Dataset,
-    Float64,
-    ModelSource,
-    Split,
-    Trajectory,
-)
-from shared.identification.dataset.writing import write_dataset
+from shared.identification.dataset.types import Float64, Split, Trajectory
+from studies.real_data.folders import write
 
 Control = Literal["torque", "position"]
 JOINTS = tuple(f"joint{number}" for number in range(1, 8))
@@ -77,12 +71,8 @@ def convert(out: Path, control: Control = "torque", seconds: float = 12.0, seed:
     trajectories = tuple(
         _recording(name, split, truth, control, seconds, rng) for name, split in splits.items()
     )
-    dataset = Dataset(
-        folder=out, source=ModelSource("mjcf", out / "model.xml"), control=control, joints=JOINTS,
-        actuators=JOINTS, trajectories=trajectories, caveats=(), hash="",
-    )  # fmt: skip
     notes = {"source": "simulated", "seed": seed, "friction": list(FRICTION)}
-    write_dataset(dataset, out, notes, {"model.xml": mjcf(known, control).encode()})
+    write(out, mjcf(known, control), control, JOINTS, trajectories, notes)
 
 
 def mjcf(arm: Arm, control: Control) -> str:
