@@ -53,8 +53,8 @@ class Chosen:
     share: float | None
     """Of the residual, that it makes; None where it was not measured."""
     is_shown: bool
-    """Whether the recordings to fit to show it, too: a drive's limit that only held-out motion
-    reaches nobody can find."""
+    """Whether the recordings to fit to show what was drawn, too: a drive's limit that only held-out
+    motion reaches nobody can find."""
 
 
 def choose(factory: Factory, made: Sequence[Plan], rng: np.random.Generator) -> tuple[Chosen, ...]:
@@ -151,13 +151,15 @@ def _drawn(factory: Factory, rulers: _Rulers, wish: Wish, rng: np.random.Generat
         size = rulers.of(wish.name).size_for(power / (1.0 + power), low, high, make)
     if wish.size is None or recipe.has_shares:
         try:
-            found = rulers.of(wish.name).power(make(size))
-            raw = rulers.on("train").raw_power(make(size))
+            robot = make(size)
+            found = rulers.of(wish.name).power(robot)
+            if wish.size is None:
+                is_shown = rulers.on("train").raw_power(robot) >= _SHOWN * found
         except SimulationError as error:
             raise IdentificationError(
                 f"{wish.name} of size {size:g} is too much: {error}"
             ) from None
-        share, is_shown = found / (1.0 + found), raw >= _SHOWN * found
+        share = found / (1.0 + found)
     return Chosen(hidden, Case(wish.name, factory.scene, place, size, shape), share, is_shown)
 
 
