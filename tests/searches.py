@@ -1,5 +1,6 @@
 """Searches put together by hand, for tests of what is made of them."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
 from shared.identification.fit import Fit, Start, polish
 from shared.identification.gate import compare
+from shared.identification.problem import Problem
 from shared.identification.screen import Screened
 from shared.identification.searched import Search, Tried
 from shared.identification.space import Space
@@ -24,7 +26,10 @@ class Searches:
 
     def __init__(self, folder: Path, seconds: float = 2.0, enter: Enter = nothing) -> None:
         rng = np.random.default_rng(0)
-        self.problem = problem_of(measure(folder, rng, enter, seconds=seconds))
+        found = problem_of(measure(folder, rng, enter, seconds=seconds))
+        # losses that are made up are the same whatever of the noise is new
+        noise = replace(found.noise, memory=None)
+        self.problem = Problem(found.subject, found.dataset, found.parameters, noise)
         self.base = self.fit(())
         self._fits: dict[tuple[Candidate, ...], Fit] = {}
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.identification.base_only import share_removed
 from shared.identification.cmaes import minimize
-from shared.identification.gate import stretches
+from shared.identification.gate import plain_stretches
 from shared.identification.searched import Search
 from shared.identification.space import Space
 
@@ -44,7 +44,8 @@ def all_at_once(found: Search, rng: np.random.Generator) -> dict[str, Any]:
     sizes = np.abs(best[space.base_size :])
     owners = [each for each in chosen for _ in each.effect.quantities(problem.subject, each.place)]
     largest = owners[int(np.argmax(sizes))]
-    loss = float(stretches(problem, space.variant(space.clip(best)), problem.of("test")).mean())
+    variant = space.variant(space.clip(best))
+    loss = float(plain_stretches(problem, variant, problem.of("test")).mean())
     return {
         "name": largest.effect.name,
         "where": largest.place,

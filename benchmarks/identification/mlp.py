@@ -45,7 +45,7 @@ def _table(found: Search, segments: tuple[int, ...]) -> tuple[np.ndarray, np.nda
     """Return float64[B, F] of what the model does, and float64[B, C] of what it leaves over."""
     problem, base = found.problem, found.base
     variant = base.space.variant(base.z)
-    residuals = problem.residuals([variant], segments)[0]
+    residuals = problem.plain(variant, segments)
     reports = problem.reports([variant], segments)[0]
     features, wanted = [], []
     for index, report, residual in zip(segments, reports, residuals, strict=True):

@@ -87,6 +87,27 @@ def base_parameters(subject: Subject) -> tuple[BaseParameter, ...]:
     return tuple(found)
 
 
+def loose_parameters(
+    subject: Subject, parameters: tuple[BaseParameter, ...]
+) -> tuple[BaseParameter, ...]:
+    """Return what else is known of links but not to the last digit, and is not fitted.
+
+    How hard each is to turn, by itself, and where its centre of mass is.
+
+    Args:
+        subject: the arm.
+        parameters: what is fitted.
+    """
+    model = subject.nominal.model
+    fitted = {each.name for each in parameters}
+    found: list[BaseParameter] = []
+    for label, body in _links(subject):
+        nominal = float(model.body_inertia[body].max())
+        found.append(_link_factor(f"inertia {label}", "kg m^2", nominal, _inertia_setter(body)))
+        found += [each for each in _centres(subject, label, body) if each.name not in fitted]
+    return tuple(found)
+
+
 def enter_base(parameters: tuple[BaseParameter, ...], x: Float64, row: Row) -> None:
     """Put the base model at coordinates into one arm: float64[n]."""
     for parameter, coordinate in zip(parameters, x, strict=True):
@@ -169,40 +190,44 @@ def _kv_setter(actuator: int) -> Callable[[Row, float], None]:
 
 
 def _inertias(subject: Subject) -> list[BaseParameter]:
-    """Return a factor of mass and inertia for each link that moves, however many joints it has."""
+    """Return a factor of mass and inertia for each link that moves, however many joints it has.
+
+    And its centre of mass, but only where motors do not hold the arm to a command: elsewhere it is
+    lost in what they hold.
+    """
     model = subject.nominal.model
     found: list[BaseParameter] = []
-    seen: set[int] = set()
+    for label, body in _links(subject):
+        nominal = float(model.body_mass[body])
+        found.append(_link_factor(f"mass {label}", "kg", nominal, _mass_setter(body)))
+        if subject.control == "torque":
+            found += _centres(subject, label, body)
+    return found
+
+
+def _links(subject: Subject) -> list[tuple[str, int]]:
+    """Return the joint and the body of each link that moves and weighs something."""
+    model = subject.nominal.model
+    found: dict[int, str] = {}
     for label in subject.joints:
         joint = int(model.joint(subject.plant.mj_joint(label)).id)
         body = int(model.jnt_bodyid[joint])
-        if model.body_mass[body] > 0.0 and body not in seen:
-            seen.add(body)
-            found.append(
-                BaseParameter(
-                    name=f"mass {label}",
-                    unit="kg",
-                    nominal=float(model.body_mass[body]),
-                    is_factor=True,
-                    scale=1.0,
-                    low=-1.0,
-                    high=1.0,
-                    prior=INERTIA_PRIOR,
-                    change=_mass_setter(body),
-                )
-            )
-            found += _centres(subject, label, body)
-    return found
+        if model.body_mass[body] > 0.0:
+            found.setdefault(body, label)
+    return [(label, body) for body, label in found.items()]
+
+
+def _link_factor(
+    name: str, unit: str, nominal: float, change: Callable[[Row, float], None]
+) -> BaseParameter:
+    return BaseParameter(name, unit, nominal, True, 1.0, -1.0, 1.0, INERTIA_PRIOR, change)
 
 
 def _centres(subject: Subject, label: str, body: int) -> list[BaseParameter]:
     """Return where the centre of mass of a link is, along its body's axes.
 
-    Only where motors do not hold the arm to a command: elsewhere it is lost in what they hold.
     Along an axis that every hinge before it turns about it is not felt.
     """
-    if subject.control != "torque":
-        return []
     model = subject.nominal.model
     is_turned = turned_axes(model, body)
     return [
@@ -225,6 +250,14 @@ def _centres(subject: Subject, label: str, body: int) -> list[BaseParameter]:
 def _centre_setter(body: int, index: int) -> Callable[[Row, float], None]:
     def change(row: Row, value: float) -> None:
         row.field("body_ipos")[body, index] = value
+
+    return change
+
+
+def _inertia_setter(body: int) -> Callable[[Row, float], None]:
+    def change(row: Row, value: float) -> None:
+        inertia = row.field("body_inertia")[body]
+        inertia *= value / inertia.max()
 
     return change
 

@@ -10,7 +10,7 @@ from shared.identification.certainty import half_widths, is_there
 from shared.identification.dataset.types import Float64
 from shared.identification.gate import compare, floor_of
 from shared.identification.problem import Variant
-from shared.identification.searched import ALIKE, Search, Tried, is_open
+from shared.identification.searched import ALIKE, Search, Tried, is_open, plain_losses
 from shared.identification.sentence import sentence_of
 from shared.identification.verdict import (
     BaseValue,
@@ -108,8 +108,9 @@ def _stands_out(left: tuple[Unexplained, ...]) -> bool:
 
 def _held_out(found: Search) -> HeldOut:
     problem = found.problem
-    gain = compare(found.base_losses, found.current_losses, np.random.default_rng(0))
-    base = float(found.base_losses.mean())
+    of_nominal, of_base, of_current = plain_losses(found)
+    gain = compare(of_base, of_current, np.random.default_rng(0))
+    base = float(of_base.mean())
     nothing = Variant(np.zeros(len(problem.parameters)))
     stages = {
         "nominal": nothing,
@@ -131,9 +132,9 @@ def _held_out(found: Search) -> HeldOut:
         tracker["noise_floor"] = 1e3 * float(np.sqrt(np.mean(problem.noise.tracker[:3] ** 2)))
     low, high = gain.share_interval(base) if found.accepted else (0.0, 0.0)
     return HeldOut(
-        nominal=float(np.sqrt(found.nominal_losses.mean())),
+        nominal=float(np.sqrt(of_nominal.mean())),
         base_fit=float(np.sqrt(base)),
-        extended=float(np.sqrt(found.current_losses.mean())),
+        extended=float(np.sqrt(of_current.mean())),
         noise_floor=float(np.sqrt(floor_of(base))),
         share_removed=gain.share(base) if found.accepted else 0.0,
         share_interval=Interval(low=low, high=high)
@@ -142,7 +143,7 @@ def _held_out(found: Search) -> HeldOut:
         joints_mrad=joints,
         tracker_mm=tracker,
         is_floor_measured=problem.noise.is_measured,
-        by_all=None if found.left_by_all is None else float(np.sqrt(found.left_by_all)),
+        by_all=None if found.by_all is None else float(np.sqrt(found.by_all.plain)),
     )
 
 

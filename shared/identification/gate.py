@@ -28,6 +28,11 @@ is the base's fault, and many a cause takes a little of that off; if another cau
 it is what makes one of use beside it."""
 LEAST_AT_ALL = 0.04
 """Of the held-out loss, then."""
+LEAST_FOLLOWED = 0.001
+"""The same of a cause that what was held out follows, see ``foretold.py``: it is sure, so small as
+it is. And of what other causes took off before: what is fast counts for most of that."""
+NOT_EXCESS = 0.1
+"""Of the noise: as much more than it is left may be the noise itself, a repeat or two say so."""
 LEAST_BESIDE = 0.005
 """Of what other causes took off before: no law is quite the arm's, and one that is off by 7 % of
 what it does leaves so much for another to make up for."""
@@ -58,6 +63,8 @@ class Gain:
     """Standard error of the difference."""
     is_measured: bool = False
     """Whether repeats say that a mean square of 1 is noise."""
+    is_followed: bool = False
+    """Whether what was held out surely follows what the cause foretells."""
 
     @property
     def gain(self) -> float:
@@ -82,15 +89,26 @@ class Gain:
         """Return whether it is better by enough of what was left before."""
         least = LEAST_GAIN * self.before
         if self.is_measured:
-            near_noise = LEAST_OF_EXCESS * (self.before - 1.0)
-            least = min(near_noise, max(least, LEAST_OF_EXCESS))
-            least = max(least, LEAST_AT_ALL * self.before)
+            least = min(self._of_excess, max(least, LEAST_OF_EXCESS))
+            at_all = LEAST_FOLLOWED if self.is_followed else LEAST_AT_ALL
+            least = max(least, at_all * self.before)
         return self.gain >= least
+
+    @property
+    def _of_excess(self) -> float:
+        """Return what it is to take off at least of what is more than noise."""
+        noise = 1.0 + NOT_EXCESS * self.is_followed
+        return max(LEAST_OF_EXCESS * (self.before - noise), 0.0)
+
+    @property
+    def _of_others(self) -> float:
+        """Return which share of what other causes took off it is to take off at least."""
+        return LEAST_FOLLOWED if self.is_followed else LEAST_BESIDE
 
     @property
     def is_sure(self) -> bool:
         """Return whether it is surely better, and by enough."""
-        return self.surely > 0.0 and self.is_enough
+        return (self.is_followed or self.surely > 0.0) and self.is_enough
 
     def is_useful(self, base: float) -> bool:
         """Return whether it passes: surely better, and by enough."""
@@ -98,8 +116,8 @@ class Gain:
             self.share(base) >= LEAST_SHARE
             or (
                 self.is_measured
-                and self.gain >= LEAST_OF_EXCESS * (self.before - 1.0)
-                and self.gain >= LEAST_BESIDE * (base - self.before)
+                and self.gain >= self._of_excess
+                and self.gain >= self._of_others * (base - self.before)
             )
         )
 
@@ -109,10 +127,17 @@ def stretches(problem: Problem, variant: Variant, segments: tuple[int, ...]) -> 
 
     A part of a recording counts without the blocks that the problem says not to count.
     """
-    parts = problem.residuals([variant], segments)[0]
-    return np.concatenate(
-        [parted(problem, segment, part) for segment, part in zip(segments, parts, strict=True)]
-    )
+    return _of_all(problem, segments, problem.residuals([variant], segments)[0])
+
+
+def plain_stretches(problem: Problem, variant: Variant, segments: tuple[int, ...]) -> Float64:
+    """Return the same of plain residuals: how far off a model is, not how surely."""
+    return _of_all(problem, segments, problem.plain(variant, segments))
+
+
+def _of_all(problem: Problem, segments: tuple[int, ...], parts: list[Float64]) -> Float64:
+    found = [parted(problem, *each) for each in zip(segments, parts, strict=True)]
+    return np.concatenate(found)
 
 
 def parted(problem: Problem, segment: int, residual: Float64) -> Float64:

@@ -106,7 +106,7 @@ def _replay(
 
 
 def _loss(problem: Problem, numbers: list[int], reports: list[Reports]) -> float:
-    squares = np.concatenate([problem.whitened(reports[each], each) ** 2 for each in numbers])
+    squares = np.concatenate([problem.floors(reports[each], each) ** 2 for each in numbers])
     return float(np.sqrt(squares.mean()))
 
 

@@ -24,6 +24,8 @@ _PER_EFFECT = 3
 """Places of one effect among those tried."""
 _SLIGHT = 0.015
 """Of the training residual: what explains less at first sight is not refitted."""
+_SURELY = 12.0
+"""Squares of a standard error that it is at least, where the noise is known to be white."""
 _SLIGHT_BESIDE = 0.1
 """The same, as a share of what the best one explains."""
 _ONCE_BESIDE = 0.3
@@ -45,14 +47,15 @@ def look(
     segments = fit.space.problem.of("train")
     progress("screen", 0.0, f"{len(candidates)} candidates")
     screened = screen(fit, candidates, segments)
-    picked = [(each, fit) for each in _diverse(screened)]
+    slight = _slight(fit)
+    picked = [(each, fit) for each in _diverse(screened, slight)]
     if is_far:
         progress("screen", 0.5, "again, from the nominal model")
         far = Fit.at(fit.space, np.r_[nominal.z, fit.z[nominal.z.size :]], segments)
         known = {each.candidate for each, _ in picked}
         new = [
             each
-            for each in _diverse(screen(far, candidates, segments))
+            for each in _diverse(screen(far, candidates, segments), slight)
             if each.candidate not in known and each.candidate.recording is None
         ]
         picked += [(each, far) for each in new[:_MORE]]
@@ -83,7 +86,13 @@ def _of_turns(
     return found
 
 
-def _diverse(screened: Sequence[Screened]) -> list[Screened]:
+def _slight(fit: Fit) -> float:
+    """Return which share of the training residual is too little to be looked at."""
+    is_white = fit.space.problem.noise.memory is not None
+    return min(_SLIGHT, _SURELY / len(fit.residual)) if is_white else _SLIGHT
+
+
+def _diverse(screened: Sequence[Screened], slight: float = _SLIGHT) -> list[Screened]:
     """Return the best few, not all of one effect; what happened once takes nobody's place."""
     counts: dict[str, int] = {}
     out: list[Screened] = []
@@ -92,7 +101,7 @@ def _diverse(screened: Sequence[Screened]) -> list[Screened]:
         name, is_once = each.candidate.effect.name, each.candidate.recording is not None
         counts[name] = counts.get(name, 0) + 1
         beside = _ONCE_BESIDE if is_once else _SLIGHT_BESIDE
-        is_slight = each.share < max(_SLIGHT, beside * screened[0].share)
+        is_slight = each.share < max(slight, beside * screened[0].share)
         if counts[name] > _PER_EFFECT or is_slight or (lasting == _TRIED and not is_once):
             continue
         out.append(each)

@@ -6,29 +6,33 @@ never less than what an encoder's steps hide: of a joint at rest two recordings 
 to the last digit.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shared.identification.dataset.resolution import steps_of
 from shared.identification.dataset.types import Dataset, Float64, Trajectory
+from shared.identification.memory import Memory, memory_of
+from shared.identification.parts import CUTS, Cut, spans_of
 from shared.identification.pushed import Pushed, pushed_of, whitening
+from shared.identification.quiet import level_of
 from shared.identification.smoothing import smooth
 from shared.identification.starts import Starts
 from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.signals import pose_error, sampled, sampled_poses
 
+Integers = NDArray[np.intp]
+
 _BAND = 25
 """Without repeats: readings that a local cubic is taken through."""
-_STRETCH = 25
-"""Blocks whose power is looked at together."""
 _FEWEST = 10
 """Readings that two recordings have to share, else the last of the shorter one is held."""
+_OF_PAIR = np.sqrt(0.5)
+"""Of what two recordings differ by, that is the noise of one."""
 _ROUND = np.sqrt(12.0)
 """A step, in standard deviations of what rounding to it does."""
-_SAMPLES = 200
-"""Of simulated noise, to learn what leaving out the noisiest stretches takes off."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,8 @@ class Noise:
     """Where a controller holds the tool alone: what joints differ by otherwise."""
     whitened: Float64 | None = None
     """float64[J], standard deviations of whitened residuals (1)."""
+    memory: Memory | None = None
+    """How much of it is carried on from block to block; None where no repeat says so."""
 
     def floors(self, residuals: Float64, whiten: Float64 | None) -> Float64:
         """Return residuals of joints in noise floors.
@@ -58,6 +64,13 @@ class Noise:
         if whiten is None or self.whitened is None:
             return residuals / self.joints
         return np.einsum("bij,bj->bi", whiten, residuals) / self.whitened
+
+    def news(self, residuals: Float64) -> Float64:
+        """Return what is new in each block of residuals in noise floors: float64[B, C].
+
+        All of it where nothing is known of what noise carries on, see :class:`Memory`.
+        """
+        return residuals if self.memory is None else self.memory.news(residuals)
 
     def whitening(self, nominal: Rollouts, q: Float64) -> Float64 | None:
         """Return what :meth:`floors` needs of an arm at postures float64[B, J]; None for most."""
@@ -74,6 +87,10 @@ class Difference:
     """float64[B', 6] (m, rad)."""
     q: Float64
     """float64[B, J], where the joints were (rad, m)."""
+    joints_parts: Integers
+    """int[B], of which part of the recording each is."""
+    tracker_parts: Integers | None
+    """int[B']."""
 
 
 def noise_of(
@@ -87,11 +104,12 @@ def noise_of(
         starts: what repeats differ by for starting elsewhere.
         nominal: the arm; None for one that is held by its joints.
     """
-    pairs = repeat_differences(dataset, block, starts)
+    cut = None if nominal is None else CUTS.get(nominal.plant.control)
+    pairs = repeat_differences(dataset, block, starts, cut)
     joints = [each.joints for each in pairs]
     tracker = [each.tracker for each in pairs if each.tracker is not None]
     if pairs:
-        scale = np.sqrt(0.5)
+        scale = _OF_PAIR
     else:
         joints = [block_means(each.joints_at, _fast(each.joints_at, each.q), block)
                   for each in dataset.trajectories]  # fmt: skip
@@ -101,11 +119,12 @@ def noise_of(
             if each.tracker_at is not None and each.tracker is not None
         ]
         scale = 1.0
-    of_joints, joint_correlation = _floor(joints, scale)
-    of_joints = np.maximum(of_joints, steps_of([each.q for each in dataset.trajectories]) / _ROUND)
+    of_joints, joint_correlation = level_of(joints, scale)
+    rounding = steps_of([each.q for each in dataset.trajectories]) / _ROUND
+    of_joints = np.maximum(of_joints, rounding)
     of_tracker, correlation = None, joint_correlation
     if dataset.has_tracker and tracker:
-        of_tracker, tracker_correlation = _floor(tracker, scale)
+        of_tracker, tracker_correlation = level_of(tracker, scale)
         if not pairs:  # poses have seven numbers, their errors six
             of_tracker = np.r_[of_tracker[:3], np.repeat(2.0 * of_tracker[4:].mean(), 3)]
             tracker_correlation = tracker_correlation[:6]
@@ -113,17 +132,52 @@ def noise_of(
     found = Noise(of_joints, of_tracker, correlation, is_measured=bool(pairs))
     differences = [(each.joints, each.q) for each in pairs]
     pushed = None if nominal is None else pushed_of(nominal, differences, scale)
-    if nominal is None or pushed is None:
+    if not pairs:
         return found
+    if nominal is None or pushed is None:
+        return replace(found, memory=_memory(found, pairs, None, rounding / of_joints))
     unit = replace(found, pushed=pushed, whitened=np.ones(len(of_joints)))
     whole = [unit.floors(each.joints, unit.whitening(nominal, each.q)) for each in pairs]
-    _, correlation = _floor(whole, scale)
+    _, correlation = level_of(whole, scale)
     whitened = scale * np.sqrt(np.mean(np.concatenate(whole) ** 2, axis=0))
     correlation = np.r_[correlation, found.correlation[len(whitened) :]]
-    return replace(unit, whitened=whitened, correlation=correlation)
+    found = replace(unit, whitened=whitened, correlation=correlation)
+    return replace(found, memory=_memory(found, pairs, nominal, np.zeros(len(whitened))))
 
 
-def repeat_differences(dataset: Dataset, block: float, starts: Starts) -> list[Difference]:
+def _memory(
+    noise: Noise, pairs: Sequence[Difference], nominal: Rollouts | None, rounding: Float64
+) -> Memory:
+    """Return how much of the noise is carried on.
+
+    Args:
+        noise: its floor.
+        pairs: what repeats differ by.
+        nominal: the arm; None for one that is held by its joints.
+        rounding: float64[J], what an encoder's steps hide, in noise floors.
+    """
+    joints: list[Float64] = []
+    tracker: list[Float64] = []
+    for each in pairs:
+        whiten = None if nominal is None else noise.whitening(nominal, each.q)
+        joints += _split(noise.floors(each.joints, whiten), each.joints_parts)
+        if noise.tracker is None or each.tracker is None or each.tracker_parts is None:
+            continue
+        tracker += _split(each.tracker / noise.tracker, each.tracker_parts)
+    found = memory_of(joints, _OF_PAIR, rounding)
+    if noise.tracker is None:
+        return found
+    return found.beside(memory_of(tracker, _OF_PAIR, np.zeros(len(noise.tracker))))
+
+
+def _split(values: Float64, parts: Integers) -> list[Float64]:
+    """Return the rows of each part by themselves."""
+    return np.split(values, np.flatnonzero(np.diff(parts)) + 1)
+
+
+def repeat_differences(
+    dataset: Dataset, block: float, starts: Starts, cut: Cut | None = None
+) -> list[Difference]:
     """Return what repeats differ by.
 
     The variance of a difference is twice that of the noise. What follows from where they started
@@ -131,21 +185,32 @@ def repeat_differences(dataset: Dataset, block: float, starts: Starts) -> list[D
     """
     by_name = {each.name: each for each in dataset.trajectories}
     return [
-        _difference(by_name[each.repeats], each, block, starts)
+        _difference(by_name[each.repeats], each, block, starts, cut)
         for each in dataset.trajectories
         if each.repeats
     ]
 
 
-def _difference(first: Trajectory, second: Trajectory, block: float, starts: Starts) -> Difference:
+def _difference(
+    first: Trajectory, second: Trajectory, block: float, starts: Starts, cut: Cut | None
+) -> Difference:
+    spans = np.zeros((0, 2)) if cut is None else spans_of(first, cut)
+
+    def parts_of(at: Float64, count: int) -> Integers:
+        times = block_means(at, at[:, None], block)[:count, 0]
+        return np.searchsorted(spans[:, 0], times, side="right")
+
     joints = block_means(first.joints_at, _against(first, second, starts), block)
-    tracker = None
-    if first.tracker_at is not None and second.tracker_at is not None:
-        tracker = block_means(first.tracker_at, _tracker_against(first, second, starts), block)
-        tracker = tracker[np.isfinite(tracker).all(axis=1)]
     q = block_means(first.joints_at, first.q, block)[: len(joints)]
     is_known = np.isfinite(joints).all(axis=1)
-    return Difference(joints[is_known], tracker, q[is_known])
+    parts = parts_of(first.joints_at, len(joints))[is_known]
+    found = Difference(joints[is_known], None, q[is_known], parts, None)
+    if first.tracker_at is None or second.tracker_at is None:
+        return found
+    tracker = block_means(first.tracker_at, _tracker_against(first, second, starts), block)
+    is_known = np.isfinite(tracker).all(axis=1)
+    parts = parts_of(first.tracker_at, len(tracker))[is_known]
+    return replace(found, tracker=tracker[is_known], tracker_parts=parts)
 
 
 def _against(first: Trajectory, second: Trajectory, starts: Starts) -> Float64:
@@ -189,45 +254,3 @@ def block_means(at: Float64, values: Float64, block: float) -> Float64:
     starts = np.flatnonzero(np.r_[True, np.diff(number) > 0])
     counts = np.diff(np.r_[starts, len(values)])[:, None]
     return np.add.reduceat(values, starts, axis=0) / counts
-
-
-def _floor(parts: list[Float64], scale: float) -> tuple[Float64, Float64]:
-    """Return standard deviations and neighbours' correlations, by column.
-
-    A stretch in which repeats part company (contact, a singular posture) would hide everything, so
-    the floor is taken from the stretches of 0.5 s without their noisiest fifth, and so are the
-    correlations: what parts slowly correlates like nothing else.
-    """
-    stretches = [
-        part[begin : begin + _STRETCH]
-        for part in parts
-        for begin in range(0, max(len(part) - _STRETCH + 1, 1), _STRETCH)
-    ]
-    power = np.array([np.mean(stretch**2, axis=0) for stretch in stretches])
-    pairs = [np.stack([stretch[1:], stretch[:-1]]) for stretch in stretches]
-    moved = np.array([np.prod(pair, axis=0).mean(axis=0) for pair in pairs])
-    total = np.array([np.mean(pair**2, axis=(0, 1)) for pair in pairs])
-    shared = _quieter(moved, power) / np.maximum(_quieter(total, power), 1e-30)
-    correlation = np.clip(shared, 0.0, 0.99)
-    variance = _quieter(power, power) / _lost(float(correlation.mean()), len(power))
-    return scale * np.sqrt(np.maximum(variance, 1e-16)), correlation
-
-
-def _quieter(values: Float64, power: Float64) -> Float64:
-    """Return the mean over stretches without the noisiest fifth: float64[D] of float64[S, D]."""
-    count = max(int(np.ceil(0.8 * len(power))), 1)
-    kept = np.argsort(power, axis=0, kind="stable")[:count]
-    return np.take_along_axis(values, kept, axis=0).mean(axis=0)
-
-
-@cache
-def _lost(correlation: float, stretches: int) -> float:
-    """Return which share of the power that leaves of noise that is the same everywhere."""
-    rng = np.random.default_rng(0)
-    noise = np.empty((_STRETCH, stretches, _SAMPLES))
-    noise[0] = rng.standard_normal((stretches, _SAMPLES))
-    for index in range(1, _STRETCH):
-        fresh = rng.standard_normal((stretches, _SAMPLES))
-        noise[index] = correlation * noise[index - 1] + np.sqrt(1 - correlation**2) * fresh
-    power = np.mean(noise**2, axis=0)
-    return float(_quieter(power, power).mean())

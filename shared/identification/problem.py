@@ -81,6 +81,13 @@ class Problem:
             _structures=self._structures,
         )  # fmt: skip
 
+    def freer(self, more: Sequence[BaseParameter]) -> "Problem":
+        """Return the same with more numbers in the base, after those that it has."""
+        return Problem(
+            self.subject, self.dataset, (*self.parameters, *more), self.noise, self.window,
+            self.uncounted, _structures=self._structures,
+        )  # fmt: skip
+
     def of(self, split: str) -> tuple[int, ...]:
         """Return the segments of the trajectories to fit to (``train``) or held out (``test``)."""
         return tuple(
@@ -122,7 +129,8 @@ class Problem:
     ) -> list[list[Float64]]:
         """Return residuals in noise floors, by variant and segment: float64[B, C].
 
-        B blocks of ``BLOCK``; C are the joints, then position and rotation of the tracker.
+        Where repeats say what noise carries on, what is new in each block. B blocks of
+        ``BLOCK``; C are the joints, then position and rotation of the tracker.
         """
         return [
             [
@@ -151,6 +159,14 @@ class Problem:
             [np.full(self.size_of(segment), segment in wanted) for segment in segments]
         )
 
+    def plain(self, variant: Variant, segments: Sequence[int]) -> list[Float64]:
+        """Return residuals in noise floors as they are, whatever noise carries on, by segment.
+
+        What is slow counts for as much there as what is fast.
+        """
+        (reports,) = self.reports([variant], segments)
+        return [self.floors(each, segment) for each, segment in zip(reports, segments, strict=True)]
+
     def vector(self, variants: Sequence[Variant], segments: Sequence[int]) -> Float64:
         """Return float64[V, M]: the residuals of each variant in one row."""
         return np.stack(
@@ -174,6 +190,10 @@ class Problem:
 
     def whitened(self, reports: Reports, segment: int) -> Float64:
         """Return the residuals of one segment in noise floors, as :meth:`residuals` does."""
+        return self.noise.news(self.floors(reports, segment))
+
+    def floors(self, reports: Reports, segment: int) -> Float64:
+        """Return float64[B, C]: block means of a segment's residuals in noise floors."""
         joints, tracker = self.raw(reports, segment)
         of_joints, of_tracker = self._bins[segment]
         out = self.in_floors(of_joints.mean(joints), segment)

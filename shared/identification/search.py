@@ -8,7 +8,13 @@ from shared.identification.effect import Candidate
 from shared.identification.family import Family, look_elsewhere, relatives
 from shared.identification.fewer import one_for_many, prune
 from shared.identification.fit import Fit, polish
-from shared.identification.gate import LEAST_SHARE, compare, floor_of, stretches
+from shared.identification.gate import (
+    LEAST_SHARE,
+    compare,
+    floor_of,
+    plain_stretches,
+    stretches,
+)
 from shared.identification.look import look
 from shared.identification.progress import Progress
 from shared.identification.refit import settle
@@ -68,14 +74,23 @@ def _is_over(found: Search) -> bool:
     must take off to be of use.
     """
     if found.problem.noise.is_measured:
-        return _is_quiet(found, found.current_losses)
+        return _is_quiet(found, so_far(found))
     left, base = float(found.current_losses.mean()), float(found.base_losses.mean())
     return left < LEAST_SHARE * (base - floor_of(base))
 
 
-def _is_quiet(found: Search, losses: Float64) -> bool:
-    """Return whether held-out losses float64[S] are not told from noise, where it was measured."""
-    return found.problem.noise.is_measured and bool(losses.mean() < QUIET)
+def _is_quiet(found: Search, model: Model) -> bool:
+    """Return whether what a model leaves is not told from noise, where that was measured.
+
+    Neither what is new in each block, nor what is slow.
+    """
+    problem = found.problem
+    if not problem.noise.is_measured or model.losses.mean() >= QUIET:
+        return False
+    if problem.noise.memory is None:
+        return True
+    variant = model.fit.space.variant(model.fit.z)
+    return bool(plain_stretches(problem, variant, problem.of("test")).mean() < QUIET)
 
 
 def _round(
@@ -141,7 +156,7 @@ def _elsewhere(
         The cause to take, its rivals, and what is like it at other joints, which may tell it from
         what were its rivals.
     """
-    if _is_quiet(found, best.losses):
+    if _is_quiet(found, Model(best.fit, best.losses)):
         return best, rivals, None
     families: list[tuple[Tried, Family]] = []
     for one in (best, *rivals):
@@ -185,8 +200,8 @@ def _explains_event(found: Search, candidate: Candidate, fit: Fit, train: tuple[
     if candidate.recording is None:
         return False
     problem = found.problem
-    before = stretches(problem, found.current.space.variant(found.current.z), train)
-    after = stretches(problem, fit.space.variant(fit.z), train)
+    before = plain_stretches(problem, found.current.space.variant(found.current.z), train)
+    after = plain_stretches(problem, fit.space.variant(fit.z), train)
     worst = int(np.argmax(before - after))
     usual = max(float(np.median(before)), 1.0)
     return bool(

@@ -5,12 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shared.identification.certainty import is_there
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
 from shared.identification.fit import Fit, Start
-from shared.identification.gate import Gain, compare
+from shared.identification.foretold import Held
+from shared.identification.gate import Gain, compare, plain_stretches
 from shared.identification.left_out import left_out
-from shared.identification.problem import Problem
+from shared.identification.problem import Problem, Variant
 from shared.identification.screen import Screened
 
 ALIKE = 0.02
@@ -28,6 +30,11 @@ STANDS_OUT = 6.0
 """Mean square residual of a stretch over the usual one, where something happened once."""
 TAKEN_AWAY = 0.4
 """Share of it that may be left by what explains it."""
+
+
+_PLAINLY, _PLAINLY_EACH = 20.0, 4.0
+"""Twice what a cause takes off the cost, at least, and more for each of its numbers: of a hundred
+candidates where there is none, the best takes off some 15."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +89,27 @@ class Otherwise:
     """Smallest cosine between what the base explains by going far, and what they explain."""
 
 
+class ByAll(NamedTuple):
+    """Mean square residuals of a model fitted to all recordings, in noise floors.
+
+    Of those that were fitted to before or of the others, whichever is more.
+    """
+
+    new: float
+    """Of what is new in each block."""
+    plain: float
+    """As they are."""
+
+
+class Left(NamedTuple):
+    """Mean square residuals of what nothing was fitted to, in noise floors."""
+
+    nominal: float
+    base: float
+    current: float
+    by_all: float | None
+
+
 @dataclass
 class Search:
     """A search while it goes on, and what it found."""
@@ -115,9 +143,25 @@ class Search:
     """The current model fitted to all recordings, for sizes; nothing is judged by it."""
     fitted_to: tuple[int, ...] = ()
     """Segments of the final fit."""
-    left_by_all: float | None = None
-    """Mean square residual of the current model fitted to all recordings, in noise floors: of those
-    that were fitted to before or of the others, whichever is more. None where it was not asked."""
+    held: Held | None = None
+    """Held-out recordings, as they were last looked at."""
+    by_all: ByAll | None = None
+    """What the current model leaves once it is fitted to all recordings; None where it was not
+    asked."""
+
+    @property
+    def left(self) -> "Left":
+        """Return how much is left of what is new in each block: there small causes show."""
+        return Left(
+            float(self.nominal_losses.mean()), float(self.base_losses.mean()),
+            float(self.current_losses.mean()), None if self.by_all is None else self.by_all.new,
+        )  # fmt: skip
+
+    @property
+    def plainly(self) -> "Left":
+        """Return how much is left as it is: what is slow and wrong shows in that."""
+        nominal, base, current = (float(each.mean()) for each in plain_losses(self))
+        return Left(nominal, base, current, None if self.by_all is None else self.by_all.plain)
 
     @property
     def told(self) -> Fit:
@@ -133,14 +177,36 @@ def is_open(found: Search) -> bool:
     what a base fit had spoiled, of motion unlike what it was fitted to. What goes once the model
     may go by all recordings is only what those to fit to did not show of it.
     """
-    base, held_out = float(found.base_losses.mean()), float(found.current_losses.mean())
-    left = min(held_out, np.inf if found.left_by_all is None else found.left_by_all)
+    return any(_is_much(found, each) for each in (found.left, found.plainly))
+
+
+def _is_much(found: Search, left: "Left") -> bool:
+    least = min(left.current, np.inf if left.by_all is None else left.by_all)
     if found.accepted:
-        if held_out >= float(found.nominal_losses.mean()):
+        if left.current >= left.nominal:
             return True
         most = BESIDE_A_DOUBT if found.doubted else np.inf
-        return left > max(BESIDE_A_NAME, min(MAY_BE_LEFT * base, most))
-    return left > NEARLY_NOISE
+        return least > max(BESIDE_A_NAME, min(MAY_BE_LEFT * left.base, most))
+    return least > NEARLY_NOISE
+
+
+def plain_losses(found: Search) -> tuple[Float64, Float64, Float64]:
+    """Return float64[S] of held-out stretches of the nominal model, the base and the current one.
+
+    Of plain residuals; those of the search where nothing is known of what noise carries on.
+    """
+    problem = found.problem
+    if problem.noise.memory is None:
+        return found.nominal_losses, found.base_losses, found.current_losses
+    variants = (
+        Variant(np.zeros(len(problem.parameters))),
+        found.base.space.variant(found.base.z),
+        found.current.space.variant(found.current.z),
+    )
+    nominal, base, current = (
+        plain_stretches(problem, each, problem.of("test")) for each in variants
+    )
+    return nominal, base, current
 
 
 class Model(NamedTuple):
@@ -183,10 +249,30 @@ def judged(found: Search, candidate: Candidate, before: Model, after: Model) -> 
     )
     beyond = gain.gain - gain.error
     surely = max(gain.surely, beyond if is_foretold else min(whole.surely, beyond))
+    is_followed = False
+    if candidate.recording is None and _is_fitted(before.fit, after.fit):
+        if found.held is None or found.held.fit is not before.fit:
+            found.held = Held(before.fit)
+        is_followed = found.held.follow(before.fit, after.fit).is_sure and is_there(
+            after.fit, candidate, found.problem.of("train")
+        )
     if candidate.recording is not None:
         surely = -np.inf  # there it only frees the base, of whatever it is
-    gain = replace(gain, surely=surely, is_measured=found.problem.noise.is_measured)
+    gain = replace(
+        gain,
+        surely=surely,
+        is_measured=found.problem.noise.is_measured,
+        is_followed=is_followed,
+    )
     return Judged(gain, more.after)
+
+
+def _is_fitted(before: Fit, after: Fit) -> bool:
+    """Return whether what was fitted to speaks for a cause so plainly that the rest is asked."""
+    if before.space.problem.noise.memory is None:
+        return False
+    numbers = after.space.size - before.space.size
+    return 2.0 * (before.cost - after.cost) > _PLAINLY + _PLAINLY_EACH * numbers
 
 
 def foretells(before: Float64, after: Float64) -> bool:

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from shared.identification.fit import Fit, polish
-from shared.identification.searched import Search, is_open
+from shared.identification.gate import plain_stretches
+from shared.identification.searched import ByAll, Search, is_open
 from shared.identification.verdict import Unexplained
 
 _STEPS = 1
@@ -45,10 +46,13 @@ def fit_to_all(found: Search, left: Sequence[Unexplained]) -> None:
     if found.accepted:
         found.final, found.fitted_to = fit, segments
     if is_asked:
-        found.left_by_all = max(_left(fit, segments, of) for of in (problem.of("train"), more))
+        both = [_left(fit, segments, of) for of in (problem.of("train"), more)]
+        found.by_all = ByAll(max(one.new for one in both), max(one.plain for one in both))
 
 
-def _left(fit: Fit, segments: tuple[int, ...], of: tuple[int, ...]) -> float:
-    """Return the mean square residual of some of the segments of a fit."""
-    rows = fit.space.problem.rows_of(segments, of)
-    return float(np.mean(fit.residual[: len(rows)][rows] ** 2))
+def _left(fit: Fit, segments: tuple[int, ...], of: tuple[int, ...]) -> ByAll:
+    """Return the mean square residuals of some of the segments of a fit."""
+    problem = fit.space.problem
+    rows = problem.rows_of(segments, of)
+    plain = plain_stretches(problem, fit.space.variant(fit.z), of)
+    return ByAll(float(np.mean(fit.residual[: len(rows)][rows] ** 2)), float(plain.mean()))

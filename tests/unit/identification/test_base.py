@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shared.identification.base import base_parameters, enter_base
+from shared.identification.base import base_parameters, enter_base, loose_parameters
 from shared.identification.catalogue.joint_elasticity import EFFECT as ELASTICITY
 from shared.identification.subject import Subject
 from shared.sim.hidden.arms import ARMS
@@ -140,3 +140,17 @@ def test_a_rail_does_not_feel_where_its_carriage_is_heavy(tmp_path: Path):
     path.write_text(arm.file.read_text().replace('axis="0 1 0"', 'type="slide" axis="1 0 0"'))
     subject = make_subject(mjcf(path, "torque", arm.joints, arm.joints, arm.tracked))
     assert not [each for each in base_parameters(subject) if "centre" in each.name]
+
+
+def test_what_else_is_known_of_links_is_how_they_turn_and_where_they_weigh(subject: Subject):
+    fitted = base_parameters(subject)
+    loose = loose_parameters(subject, fitted)
+    assert not {each.name for each in loose} & {each.name for each in fitted}
+    assert {f"inertia {joint}" for joint in JOINTS} <= {each.name for each in loose}
+    x = np.where([each.name == "inertia elbow" for each in loose], 0.1, 0.0)
+    row = subject.nominal.entered(lambda row: enter_base(loose, x, row), recorded(_COMMAND))
+    model = subject.nominal.model
+    fore = model.body("fore").id
+    assert row.field("body_inertia")[fore] == pytest.approx(np.exp(0.1) * model.body_inertia[fore])
+    assert "body_mass" not in row.fields
+    assert any(each.name.startswith("centre_") for each in loose)

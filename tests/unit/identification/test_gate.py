@@ -1,5 +1,6 @@
 """The gate: an interval that covers, and nothing passes that is not sure and enough."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -99,3 +100,23 @@ def test_how_much_is_enough_depends_on_what_is_left_beyond_measured_noise(
     loss = before - gain
     found = Gain(loss, before, 0.5 * gain, 1.5 * gain, 0.1 * gain, 0.2 * gain, is_measured)
     assert found.is_enough == is_enough
+
+
+@pytest.mark.parametrize(
+    ("before", "gain", "is_enough"),
+    [
+        (1.05, 0.004, True),
+        (1.05, 0.0005, False),  # of no use to anybody
+        (1.4, 0.06, False),  # the base is not quite right: it is sure, and may be the base's fault
+        (1.4, 0.09, True),
+    ],
+)
+def test_of_a_cause_that_what_is_held_out_follows_little_is_enough(
+    before: float, gain: float, is_enough: bool
+):
+    found = Gain(
+        before - gain, before, -gain, 3.0 * gain, -2.0 * gain, gain, is_measured=True,
+        is_followed=True,
+    )  # fmt: skip
+    assert found.is_enough == found.is_sure == found.is_useful(before) == is_enough
+    assert not replace(found, is_followed=False).is_sure

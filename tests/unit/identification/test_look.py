@@ -71,7 +71,7 @@ def test_an_interval_that_looks_like_a_delay_of_half_of_it_is_told_from_it():
     _, rough = look(fit, Start(begun.z, begun.jacobian), (latched, late), False, silent)
     assert [each.screened.candidate for each in rough] == [latched, late]
     assert rough[0].space.values(rough[0].z)[0][0] == pytest.approx(0.0243, rel=1e-3)
-    assert rough[1].space.values(rough[1].z)[0][0] == pytest.approx(0.0122, rel=0.1)
+    assert rough[1].space.values(rough[1].z)[0][0] == pytest.approx(0.0122, rel=0.15)
     assert rough[0].ratio < 0.7 * rough[1].ratio
 
 

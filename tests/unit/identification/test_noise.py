@@ -49,6 +49,23 @@ def test_the_floor_of_correlated_noise_is_found_from_one_repeat(
     assert correlation - 0.06 < found.correlation.mean() < correlation + 0.03
 
 
+@pytest.mark.parametrize("correlation", [0.0, 0.6, 0.9])
+def test_what_is_new_in_a_block_is_white_noise_of_variance_one(correlation: float):
+    rng = np.random.default_rng(8)
+    first, second = (0.01 * autoregressive(rng, correlation, 40) for _ in range(2))
+    found = noise_of(repeated(first, second), 0.02, {})
+    fresh = found.news(autoregressive(rng, correlation, 40))
+    assert np.mean(fresh**2) == pytest.approx(1.0, rel=0.1)
+    assert np.mean(fresh[1:] * fresh[:-1]) == pytest.approx(0.0, abs=0.08)
+
+
+def test_without_repeats_nothing_is_known_to_be_carried_on():
+    noise = autoregressive(np.random.default_rng(9), 0.9, 5)
+    found = noise_of(repeated(noise, None), 0.02, {})
+    assert found.memory is None
+    assert found.news(noise) is noise
+
+
 def test_a_stretch_in_which_repeats_part_company_does_not_raise_the_floor():
     rng = np.random.default_rng(4)
     first, second = (autoregressive(rng, 0.0, 50) for _ in range(2))

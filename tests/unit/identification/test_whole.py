@@ -98,7 +98,7 @@ def test_a_base_by_itself_is_not_fitted_again_where_little_is_left(searches: Sea
     found = searches.search(_GOOD)
     fit_to_all(found, ())
     assert found.final is None
-    assert found.left_by_all is None
+    assert found.by_all is None
 
 
 def test_what_goes_once_held_out_recordings_have_a_say_is_not_left_unexplained(searches: Searches):
@@ -108,11 +108,11 @@ def test_what_goes_once_held_out_recordings_have_a_say_is_not_left_unexplained(s
     found = searches.search(_BAD, tried)
     assert conclude(found, ()).word == "unexplained"
     fit_to_all(found, ())
-    assert found.left_by_all is not None
-    assert 0.5 < found.left_by_all < 1.5
+    assert found.by_all is not None
+    assert 0.5 < found.by_all.plain < 1.5
     after = conclude(found, ())
     assert after.word == "named"
-    assert after.held_out.by_all == pytest.approx(np.sqrt(found.left_by_all))
+    assert after.held_out.by_all == pytest.approx(np.sqrt(found.by_all.plain))
     assert f"{after.held_out.by_all:.2f} once it is fitted to these, too" in after.sentence
 
 
@@ -120,8 +120,8 @@ def test_what_stays_with_every_recording_in_the_fit_is_unexplained(searches: Sea
     found = searches.search(_BAD)
     fit_to_all(found, ())
     assert found.final is None
-    assert found.left_by_all is not None
-    assert found.left_by_all > 2.0
+    assert found.by_all is not None
+    assert found.by_all.new > 2.0
     assert conclude(found, ()).word == "unexplained"
 
 
@@ -132,4 +132,4 @@ def test_without_a_measured_floor_held_out_recordings_have_no_say_in_what_is_lef
     noise = replace(searches.problem.noise, is_measured=False)
     found.problem = replace(searches.problem, noise=noise)
     fit_to_all(found, ())
-    assert found.left_by_all is None
+    assert found.by_all is None
