@@ -87,6 +87,12 @@ def problem_of(dataset: Dataset) -> Problem:
     return Problem(subject, dataset, base_parameters(subject), noise_of(dataset, BLOCK, {}))
 
 
+def plain(problem: Problem) -> Problem:
+    """Return a problem as if nothing were known of what noise carries on: residuals as they are."""
+    noise = replace(problem.noise, memory=None)
+    return Problem(problem.subject, problem.dataset, problem.parameters, noise)
+
+
 def nominal(problem: Problem) -> Variant:
     """Return the arm as its model file has it."""
     return Variant(np.zeros(len(problem.parameters)))

@@ -1,6 +1,5 @@
 """Searches put together by hand, for tests of what is made of them."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +10,10 @@ from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
 from shared.identification.fit import Fit, Start, polish
 from shared.identification.gate import compare
-from shared.identification.problem import Problem
 from shared.identification.screen import Screened
 from shared.identification.searched import Search, Tried
 from shared.identification.space import Space
-from tests.measured import Enter, measure, nothing, problem_of
+from tests.measured import Enter, measure, nothing, plain, problem_of
 
 ELBOW, LIFT = Candidate(BIAS, "elbow"), Candidate(BIAS, "lift")
 DRAG, OFFSET = Candidate(VISCOUS, "elbow"), Candidate(BIAS, "pan")
@@ -26,10 +24,8 @@ class Searches:
 
     def __init__(self, folder: Path, seconds: float = 2.0, enter: Enter = nothing) -> None:
         rng = np.random.default_rng(0)
-        found = problem_of(measure(folder, rng, enter, seconds=seconds))
         # losses that are made up are the same whatever of the noise is new
-        noise = replace(found.noise, memory=None)
-        self.problem = Problem(found.subject, found.dataset, found.parameters, noise)
+        self.problem = plain(problem_of(measure(folder, rng, enter, seconds=seconds)))
         self.base = self.fit(())
         self._fits: dict[tuple[Candidate, ...], Fit] = {}
 

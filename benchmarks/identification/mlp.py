@@ -45,10 +45,10 @@ def _table(found: Search, segments: tuple[int, ...]) -> tuple[np.ndarray, np.nda
     """Return float64[B, F] of what the model does, and float64[B, C] of what it leaves over."""
     problem, base = found.problem, found.base
     variant = base.space.variant(base.z)
-    residuals = problem.plain(variant, segments)
     reports = problem.reports([variant], segments)[0]
     features, wanted = [], []
-    for index, report, residual in zip(segments, reports, residuals, strict=True):
+    for index, report in zip(segments, reports, strict=True):
+        residual = problem.floors(report, index)
         recorded = problem.segments[index].recorded
         at = recorded.joints_at[0] + BLOCK * (np.arange(len(residual)) + 0.5)
         q = sampled(recorded.joints_at, report.q, at)

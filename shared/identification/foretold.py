@@ -99,6 +99,6 @@ def _counted(problem: Problem, segments: tuple[int, ...]) -> np.ndarray:
     parts: list[np.ndarray] = []
     for segment in segments:
         rows, channels = problem.shape_of(segment)
-        left_out = problem.uncounted.get(segment, np.zeros(rows, np.bool_))[:rows]
+        left_out = problem.uncounted.get(segment, np.zeros(rows, np.bool_))
         parts.append(np.repeat(~left_out, channels))
     return np.concatenate(parts)

@@ -134,15 +134,16 @@ def noise_of(
     pushed = None if nominal is None else pushed_of(nominal, differences, scale)
     if not pairs:
         return found
-    if nominal is None or pushed is None:
-        return replace(found, memory=_memory(found, pairs, None, rounding / of_joints))
-    unit = replace(found, pushed=pushed, whitened=np.ones(len(of_joints)))
-    whole = [unit.floors(each.joints, unit.whitening(nominal, each.q)) for each in pairs]
-    _, correlation = level_of(whole, scale)
-    whitened = scale * np.sqrt(np.mean(np.concatenate(whole) ** 2, axis=0))
-    correlation = np.r_[correlation, found.correlation[len(whitened) :]]
-    found = replace(unit, whitened=whitened, correlation=correlation)
-    return replace(found, memory=_memory(found, pairs, nominal, np.zeros(len(whitened))))
+    hidden = rounding / of_joints
+    if nominal is not None and pushed is not None:
+        unit = replace(found, pushed=pushed, whitened=np.ones(len(of_joints)))
+        whole = [unit.floors(each.joints, unit.whitening(nominal, each.q)) for each in pairs]
+        _, correlation = level_of(whole, scale)
+        whitened = scale * np.sqrt(np.mean(np.concatenate(whole) ** 2, axis=0))
+        correlation = np.r_[correlation, found.correlation[len(whitened) :]]
+        found = replace(unit, whitened=whitened, correlation=correlation)
+        hidden = np.zeros(len(whitened))
+    return replace(found, memory=_memory(found, pairs, nominal, hidden))
 
 
 def _memory(

@@ -134,7 +134,7 @@ class Problem:
         """
         return [
             [
-                self.whitened(report, segment)
+                self.noise.news(self.floors(report, segment))
                 for report, segment in zip(reports, segments, strict=True)
             ]
             for reports in self.reports(variants, segments)
@@ -187,10 +187,6 @@ class Problem:
     def in_floors(self, joints: Float64, segment: int) -> Float64:
         """Return block means of a segment's joint residuals, float64[B, J], in noise floors."""
         return self.noise.floors(joints, self._whitening[segment])
-
-    def whitened(self, reports: Reports, segment: int) -> Float64:
-        """Return the residuals of one segment in noise floors, as :meth:`residuals` does."""
-        return self.noise.news(self.floors(reports, segment))
 
     def floors(self, reports: Reports, segment: int) -> Float64:
         """Return float64[B, C]: block means of a segment's residuals in noise floors."""

@@ -14,6 +14,7 @@ from statistics import NormalDist
 import numpy as np
 
 from shared.identification.dataset.types import Float64
+from shared.identification.memory import Memory
 
 POWER_WINDOWS = (5, 10, 25)
 """Blocks."""
@@ -181,8 +182,8 @@ def _usable(noise: Sequence[Float64], window: int) -> list[Float64]:
 
 def _power(x: Float64, correlation: Float64, window: int) -> Float64:
     """Return float64[B - window + 1, C], mean squares of innovations."""
-    new = np.concatenate([x[:1], (x[1:] - correlation * x[:-1]) / np.sqrt(1.0 - correlation**2)])
-    return _moving(new**2, window)
+    memory = Memory(correlation, np.sqrt(1.0 - correlation**2))
+    return _moving(memory.news(x) ** 2, window)
 
 
 def _mean(x: Float64, correlation: Float64, window: int) -> Float64:

@@ -27,6 +27,7 @@ from shared.identification.searched import (
     Tried,
     cosine,
     judged,
+    plain_losses_of,
     so_far,
 )
 from shared.identification.space import Space
@@ -84,13 +85,9 @@ def _is_quiet(found: Search, model: Model) -> bool:
 
     Neither what is new in each block, nor what is slow.
     """
-    problem = found.problem
-    if not problem.noise.is_measured or model.losses.mean() >= QUIET:
+    if not found.problem.noise.is_measured or model.losses.mean() >= QUIET:
         return False
-    if problem.noise.memory is None:
-        return True
-    variant = model.fit.space.variant(model.fit.z)
-    return bool(plain_stretches(problem, variant, problem.of("test")).mean() < QUIET)
+    return bool(plain_losses_of(found.problem, model).mean() < QUIET)
 
 
 def _round(

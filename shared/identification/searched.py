@@ -150,7 +150,7 @@ class Search:
     asked."""
 
     @property
-    def left(self) -> "Left":
+    def left(self) -> Left:
         """Return how much is left of what is new in each block: there small causes show."""
         return Left(
             float(self.nominal_losses.mean()), float(self.base_losses.mean()),
@@ -158,7 +158,7 @@ class Search:
         )  # fmt: skip
 
     @property
-    def plainly(self) -> "Left":
+    def plainly(self) -> Left:
         """Return how much is left as it is: what is slow and wrong shows in that."""
         nominal, base, current = (float(each.mean()) for each in plain_losses(self))
         return Left(nominal, base, current, None if self.by_all is None else self.by_all.plain)
@@ -177,10 +177,10 @@ def is_open(found: Search) -> bool:
     what a base fit had spoiled, of motion unlike what it was fitted to. What goes once the model
     may go by all recordings is only what those to fit to did not show of it.
     """
-    return any(_is_much(found, each) for each in (found.left, found.plainly))
+    return _is_much(found, found.left) or _is_much(found, found.plainly)
 
 
-def _is_much(found: Search, left: "Left") -> bool:
+def _is_much(found: Search, left: Left) -> bool:
     least = min(left.current, np.inf if left.by_all is None else left.by_all)
     if found.accepted:
         if left.current >= left.nominal:
@@ -195,18 +195,24 @@ def plain_losses(found: Search) -> tuple[Float64, Float64, Float64]:
 
     Of plain residuals; those of the search where nothing is known of what noise carries on.
     """
-    problem = found.problem
+    nothing = Variant(np.zeros(len(found.problem.parameters)))
+    base, current = Model(found.base, found.base_losses), so_far(found)
+    return (
+        _plain(found.problem, nothing, found.nominal_losses),
+        plain_losses_of(found.problem, base),
+        plain_losses_of(found.problem, current),
+    )
+
+
+def plain_losses_of(problem: Problem, model: "Model") -> Float64:
+    """Return float64[S] of one model's, the same."""
+    return _plain(problem, model.fit.space.variant(model.fit.z), model.losses)
+
+
+def _plain(problem: Problem, variant: Variant, losses: Float64) -> Float64:
     if problem.noise.memory is None:
-        return found.nominal_losses, found.base_losses, found.current_losses
-    variants = (
-        Variant(np.zeros(len(problem.parameters))),
-        found.base.space.variant(found.base.z),
-        found.current.space.variant(found.current.z),
-    )
-    nominal, base, current = (
-        plain_stretches(problem, each, problem.of("test")) for each in variants
-    )
-    return nominal, base, current
+        return losses
+    return plain_stretches(problem, variant, problem.of("test"))
 
 
 class Model(NamedTuple):
@@ -249,22 +255,26 @@ def judged(found: Search, candidate: Candidate, before: Model, after: Model) -> 
     )
     beyond = gain.gain - gain.error
     surely = max(gain.surely, beyond if is_foretold else min(whole.surely, beyond))
-    is_followed = False
-    if candidate.recording is None and _is_fitted(before.fit, after.fit):
-        if found.held is None or found.held.fit is not before.fit:
-            found.held = Held(before.fit)
-        is_followed = found.held.follow(before.fit, after.fit).is_sure and is_there(
-            after.fit, candidate, found.problem.of("train")
-        )
-    if candidate.recording is not None:
+    is_once = candidate.recording is not None
+    if is_once:
         surely = -np.inf  # there it only frees the base, of whatever it is
     gain = replace(
         gain,
         surely=surely,
         is_measured=found.problem.noise.is_measured,
-        is_followed=is_followed,
+        is_followed=not is_once and _is_followed(found, candidate, before.fit, after.fit),
     )
     return Judged(gain, more.after)
+
+
+def _is_followed(found: Search, candidate: Candidate, before: Fit, after: Fit) -> bool:
+    """Return whether what was held out follows a cause, however little it takes off."""
+    if not _is_fitted(before, after):
+        return False
+    if found.held is None or found.held.fit is not before:
+        found.held = Held(before)
+    is_sure = found.held.follow(before, after).is_sure
+    return is_sure and is_there(after, candidate, found.problem.of("train"))
 
 
 def _is_fitted(before: Fit, after: Fit) -> bool:

@@ -38,13 +38,9 @@ def changed_by(fit: Fit, timestep: float) -> Float64:
     test = problem.of("test")
     plant = finer(problem.subject.plant, timestep)
     subject = replace(problem.subject, plant=plant, nominal=Rollouts(plant, (), len(test)))
-    noise = replace(problem.noise, memory=None)  # what is slow counts, too
-    both = [
-        Problem(each, problem.dataset, problem.parameters, noise, problem.window)
-        for each in (problem.subject, subject)
-    ]
+    other = Problem(subject, problem.dataset, problem.parameters, problem.noise, problem.window)
     joints = len(subject.joints)
-    (before,), (after,) = (each.residuals([variant], test) for each in both)
+    before, after = (each.plain(variant, test) for each in (problem, other))
     changed = [one[:, :joints] - two[:, :joints] for one, two in zip(before, after, strict=True)]
     return np.sqrt(np.mean(np.concatenate(changed) ** 2, axis=0))
 

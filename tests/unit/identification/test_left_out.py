@@ -1,7 +1,5 @@
 """A cause, judged on recordings that had no say in its size."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from shared.identification.catalogue.external_contact import EFFECT as PUSH
@@ -11,18 +9,16 @@ from shared.identification.fit import Fit, polish
 from shared.identification.hidden.generator import simulated
 from shared.identification.hidden.recipe import Recipe, Wish
 from shared.identification.left_out import LeftOut, left_out
-from shared.identification.problem import Problem
 from shared.identification.space import Space
-from tests.measured import problem_of
+from tests.measured import plain, problem_of
 
 
 def judged(wish: Wish, candidate: Candidate, start: tuple[float, ...], train: int = 3) -> LeftOut:
     recipe = Recipe(
         arm="arm3", seed=5, wishes=(wish,), has_shares=False, seconds=3.0, train=train, test=1
     )
-    found = problem_of(simulated(recipe)[0])
-    plain = replace(found.noise, memory=None)  # a spring is slow: it shows in residuals as they are
-    problem = Problem(found.subject, found.dataset, found.parameters, plain)
+    # a spring is slow: it shows in residuals as they are
+    problem = plain(problem_of(simulated(recipe)[0]))
     segments = problem.of("train")
     space = Space(problem)
     before = polish(space, np.zeros(space.size), segments, 4)
