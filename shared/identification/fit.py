@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shared.identification.cmaes import minimize
 from shared.identification.dataset.types import Float64
@@ -22,6 +23,8 @@ _DAMPINGS = (1e-3, 1e-1, 1.0, 100.0)
 """Factors of Marquardt's damping that are tried at once."""
 _MENDED = 6
 """The most steps with one derivative."""
+_NEARLY = 0.01
+"""A second start that comes down to so little more than the first one has found the same."""
 _SLIGHT = 0.01
 """A step with a mended derivative that takes off less than this share is its last one."""
 AGREE = 0.02
@@ -47,6 +50,11 @@ class Fit:
     def spread(self) -> Float64:
         """Return float64[n, n]: covariance of the vector, of white residuals of variance 1."""
         return np.asarray(np.linalg.pinv(self.jacobian.T @ self.jacobian), np.float64)
+
+    def on(self, rows: NDArray[np.bool_]) -> "Fit":
+        """Return it as some rows, bool[M], see it; what is known beforehand counts as it did."""
+        kept = np.r_[rows, np.ones(self.space.size, np.bool_)]
+        return Fit.of(self.space, self.z, self.residual[kept], self.jacobian[kept])
 
     @staticmethod
     def of(space: Space, z: Float64, residual: Float64, jacobian: Float64) -> "Fit":
@@ -255,14 +263,35 @@ def _fitted(space: Space, searched: Float64) -> BaseFits:
     at_nominal = parts.jacobian(origin, pieces)
     begun = polish(parts, origin, pieces, 6, known=at_nominal)
     is_same = parts.problem is problem
-    fits = [
-        begun if is_same else polish(space, begun.z, segments, 6),
-        polish(space, searched, segments, 6),
-    ]
+    first = begun if is_same else polish(space, begun.z, segments, 6)
+    fits = [first, _from_elsewhere(space, searched, first, segments)]
     best = min(fits, key=lambda fit: fit.cost)
-    agree = max(fit.cost for fit in fits) <= best.cost * (1 + AGREE) + 1.0
+    agree = max(fit.cost for fit in fits) <= _as_good(best.cost)
     nominal = Start(origin, at_nominal[1])
     return BaseFits(nominal, best if is_same else begun, replace(best, starts_agree=agree))
+
+
+def _from_elsewhere(space: Space, start: Float64, first: Fit, segments: tuple[int, ...]) -> Fit:
+    """Return a fit from a second start: the first one, where it comes as far down as that.
+
+    It goes down with the first one's derivative, then with its own.
+    """
+    z = space.clip(start)
+    residual = space.residual([z], segments)[0]
+    found = fit = go_down(Fit.of(space, z, residual, first.jacobian), segments)
+    for _ in range(6):
+        if first.cost * (1 - _ENOUGH) < found.cost < first.cost * (1 + _NEARLY):
+            return first
+        fit = Fit.at(space, found.z, segments)
+        found = go_down(fit, segments)
+        if not found.cost < fit.cost * (1 - _ENOUGH):
+            break
+    return fit
+
+
+def _as_good(cost: float) -> float:
+    """Return up to which cost another fit is as good as one."""
+    return cost * (1 + AGREE) + 1.0
 
 
 def _on_parts(space: Space) -> Space:

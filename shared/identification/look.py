@@ -33,8 +33,9 @@ _ONCE_BESIDE = 0.3
 
 
 def look(
-    fit: Fit, nominal: Start, candidates: Sequence[Candidate], is_far: bool, progress: Progress
-) -> tuple[list[Screened], list[Rough]]:
+    fit: Fit, nominal: Start, candidates: Sequence[Candidate], is_far: bool, progress: Progress,
+    is_calm: bool = False,
+) -> tuple[list[Screened], list[Rough]]:  # fmt: skip
     """Return what every candidate could explain, best first, and rough refits of the best.
 
     Args:
@@ -43,12 +44,15 @@ def look(
         candidates: what is looked for.
         is_far: whether so much is left that the base may be bent.
         progress: is told how far it is.
+        is_calm: whether nothing stands out that may have happened once; no such candidate is
+            refitted then.
     """
     segments = fit.space.problem.of("train")
     progress("screen", 0.0, f"{len(candidates)} candidates")
     screened = screen(fit, candidates, segments)
     slight = _slight(fit)
-    picked = [(each, fit) for each in _diverse(screened, slight)]
+    refitted = [each for each in screened if not is_calm or each.candidate.recording is None]
+    picked = [(each, fit) for each in _diverse(refitted, slight)]
     if is_far:
         progress("screen", 0.5, "again, from the nominal model")
         far = Fit.at(fit.space, np.r_[nominal.z, fit.z[nominal.z.size :]], segments)

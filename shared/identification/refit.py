@@ -3,8 +3,8 @@
 A base fit that lacks the cause has bent its parameters towards it, and the way back is not
 straight. So a refit begins twice, at the base's fit and at the nominal model, each with the
 derivative that was computed there, and mends it as it goes (Broyden 1965); beside an accepted cause
-with which hardly more than noise is left, only once. The few candidates
-that remain in the running get a full fit.
+with which hardly more than noise is left, only once. Where that derivative foretells what comes, a
+refit takes none of its own. The few candidates that remain in the running get a full fit.
 """
 
 from dataclasses import dataclass
@@ -27,6 +27,8 @@ _PARTS = (1.0, 0.5, 0.25)
 _ENOUGH = 0.01
 _BENT = 1.5
 """Mean square residual, in noise floors, from which the base may be bent towards a cause."""
+_STRAIGHT = 0.15
+"""Of a change, that a derivative may be off by to do for good."""
 _EVERY = 2
 """One in so many parts is enough for a rough look."""
 
@@ -71,19 +73,24 @@ def refit(
         there[is_form] = way[is_form]
         ways.append(space.clip(there))
     ways.append(space.clip(np.r_[begun.z, screened.start]))
-    found = [_descend(space, ways, begun.jacobian[: len(rows)][rows], picked, fit.space.size)]
+    known = begun.on(rows)
+    down = _descend(space, ways, begun.jacobian[: len(rows)][rows], picked, fit.space.size)
+    found = [down]
     is_plain = bool(fit.space.candidates) and not any(each.phase for each in quantities)
     is_near = problem.noise.is_measured and 2.0 * fit.cost < _BENT * len(rows)
     if not (is_plain and is_near):
         found.append(_from_nominal(fit, nominal, screened, picked, rows))
-    z, cost = _mended(space, *min(found, key=lambda one: one[1]), picked)
+    best = min(found, key=lambda one: one.cost)
+    z, cost = best.z, best.cost
+    if best is not down or not _is_straight(known, down):
+        z, cost = _mended(space, z, cost, picked)
     before = 0.5 * float(np.sum(fit.residual[: len(rows)][rows] ** 2))
     return Rough(screened, space, z, cost / max(before, 1e-12))
 
 
 def _from_nominal(
     fit: Fit, nominal: Start, screened: Screened, picked: tuple[int, ...], rows: NDArray[np.bool_]
-) -> tuple[Float64, float]:
+) -> Fit:
     """Return where a refit comes to that begins at the nominal model."""
     space = fit.space.grown(screened.candidate)
     quantities = screened.candidate.effect.quantities(
@@ -132,8 +139,16 @@ def _mended(
 
 def _descend(
     space: Space, starts: list[Float64], kept: Float64, segments: tuple[int, ...], known: int
-) -> tuple[Float64, float]:
-    """Go down from the best of some starts with a derivative of which part is known."""
+) -> Fit:
+    """Go down from the best of some starts with a derivative of which part is known.
+
+    Args:
+        space: what is fitted.
+        starts: float64[n] each.
+        kept: float64[M, at least ``known``], the derivative without what is known beforehand.
+        segments: recordings to fit to.
+        known: so many columns of it are.
+    """
     found = space.residual(starts, segments)
     costs = 0.5 * np.sum(found**2, axis=1)
     best = int(np.argmin(costs))
@@ -144,20 +159,55 @@ def _descend(
     base[:rows] = kept[:, :known]
     base[rows : rows + known] = np.diag(1.0 / space.priors[:known])
     jacobian = np.concatenate([base, own], axis=1)
-    down = go_down(Fit.of(space, z, residual, jacobian), segments, _DAMPINGS)
-    return down.z, down.cost
+    return go_down(Fit.of(space, z, residual, jacobian), segments, _DAMPINGS)
 
 
-def settle(space: Space, start: Float64, segments: tuple[int, ...]) -> Fit:
+def settle(
+    space: Space, start: Float64, segments: tuple[int, ...], known: Fit | None = None
+) -> Fit:
     """Return a fit from one true derivative, mended as it goes: enough to judge, not to report.
 
-    Twice, where the second derivative still finds something.
+    Twice, where the second derivative still finds something; from none, where one that is known
+    foretells what comes.
+
+    Args:
+        space: what is fitted.
+        start: float64[n].
+        segments: recordings to fit to.
+        known: a fit to them without the newest candidate.
     """
+    if known is not None and turning_of(space) is None:
+        rows = len(known.residual) - known.space.size
+        kept = known.jacobian[:rows]
+        down = _descend(space, [space.clip(start)], kept, segments, known.space.size)
+        if _is_straight(known, down):
+            return down
+        start = down.z
     before = _in_turn(Fit.at(space, space.clip(start), segments), segments)
     found = go_down(before, segments, _DAMPINGS)
     if found.cost > before.cost * (1 - _ENOUGH) or _is_there(found):
         return found
     return go_down(Fit.at(space, found.z, segments), segments, _DAMPINGS)
+
+
+def _is_straight(known: Fit, down: Fit) -> bool:
+    """Return whether a derivative foretells a fit from one that lacks its newest candidate.
+
+    Then it is about as good where that fit is, and the fit is at its best.
+
+    Args:
+        known: without the candidate, on the same rows.
+        down: with it, and the derivative that led there.
+    """
+    subject = down.space.problem.subject
+    newest = down.space.candidates[-1]
+    is_form = [bool(each.grid) for each in newest.effect.quantities(subject, newest.place)]
+    extra = down.z[known.space.size :]
+    moved = np.r_[down.z[: known.space.size] - known.z, np.where(is_form, 0.0, extra)]
+    rows = len(known.residual) - known.space.size
+    came = down.residual[:rows] - known.residual[:rows]
+    off = came - down.jacobian[:rows] @ moved
+    return float(off @ off) < _STRAIGHT**2 * float(came @ came)
 
 
 def _is_there(fit: Fit) -> bool:

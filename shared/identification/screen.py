@@ -83,7 +83,7 @@ def screen(fit: Fit, candidates: Sequence[Candidate], segments: tuple[int, ...])
     lasting = [each for each in candidates if each.recording is None]
     steady = [each for each in lasting if _is_steady(subject, each)]
     local = [each for each in lasting if not _is_steady(subject, each)]
-    found = sorted(_screened(_on(fit, rows), steady, picked, None), key=_best_first)
+    found = sorted(_screened(fit.on(rows), steady, picked, None), key=_best_first)
     is_plain = 2.0 * fit.cost > _PLAIN * len(fit.residual)
     if len(picked) < len(segments) and not is_plain:
         local += [each.candidate for each in found[:_CLOSER]]
@@ -110,12 +110,6 @@ def _is_steady(subject: Subject, candidate: Candidate) -> bool:
     """Return whether a candidate acts at any size."""
     found = candidate.effect.quantities(subject, candidate.place)
     return all(each.is_smooth for each in found)
-
-
-def _on(fit: Fit, rows: NDArray[np.bool_]) -> Fit:
-    """Return a fit as some rows see it; what is known beforehand counts as it did."""
-    kept = np.r_[rows, np.ones(fit.space.size, np.bool_)]
-    return Fit.of(fit.space, fit.z, fit.residual[kept], fit.jacobian[kept])
 
 
 def _screened(

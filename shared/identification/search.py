@@ -16,6 +16,7 @@ from shared.identification.gate import (
     stretches,
 )
 from shared.identification.look import look
+from shared.identification.problem import Variant
 from shared.identification.progress import Progress
 from shared.identification.refit import settle
 from shared.identification.searched import (
@@ -100,7 +101,8 @@ def _round(
         return False
     is_measured = found.problem.noise.is_measured
     is_far = not is_measured or float(found.current_losses.mean()) > _FAR_OFF
-    screened, roughly = look(found.parts, found.nominal, left, is_far, progress)
+    is_calm = not _stands_out(plain_stretches(found.problem, _now(found), train))
+    screened, roughly = look(found.parts, found.nominal, left, is_far, progress, is_calm)
     for each in screened:
         found.screened.setdefault(each.candidate.label, each)
     tried: list[Tried] = []
@@ -109,7 +111,7 @@ def _round(
             break
         progress("decide", len(tried) / _FULL, each.screened.candidate.label)
         space = Space(found.problem, each.space.candidates)
-        fit = settle(space, each.z, train)
+        fit = settle(space, each.z, train, found.current)
         losses = stretches(found.problem, space.variant(fit.z), test)
         gain, fitted = judged(found, each.screened.candidate, so_far(found), Model(fit, losses))
         is_event = _explains_event(found, each.screened.candidate, fit, train)
@@ -196,16 +198,30 @@ def _explains_event(found: Search, candidate: Candidate, fit: Fit, train: tuple[
     """
     if candidate.recording is None:
         return False
-    problem = found.problem
-    before = plain_stretches(problem, found.current.space.variant(found.current.z), train)
-    after = plain_stretches(problem, fit.space.variant(fit.z), train)
+    before = plain_stretches(found.problem, _now(found), train)
+    after = plain_stretches(found.problem, fit.space.variant(fit.z), train)
     worst = int(np.argmax(before - after))
-    usual = max(float(np.median(before)), 1.0)
+    most = _usually(before)
     return bool(
-        before[worst] > STANDS_OUT * usual
+        before[worst] > most
         and after[worst] < TAKEN_AWAY * before[worst]
-        and after.max() < max(TAKEN_AWAY * before.max(), STANDS_OUT * usual)
+        and after.max() < max(TAKEN_AWAY * before.max(), most)
     )
+
+
+def _now(found: Search) -> Variant:
+    """Return the model with what was accepted so far."""
+    return found.current.space.variant(found.current.z)
+
+
+def _usually(losses: Float64) -> float:
+    """Return what a stretch in which nothing happened leaves at most."""
+    return STANDS_OUT * max(float(np.median(losses)), 1.0)
+
+
+def _stands_out(losses: Float64) -> bool:
+    """Return whether something happened once, in any of some stretches."""
+    return bool(losses.max() > _usually(losses))
 
 
 def _sure(useful: list[Tried], train: tuple[int, ...]) -> list[Tried]:

@@ -9,12 +9,19 @@ import pytest
 from shared.identification.base import base_parameters, enter_base
 from shared.identification.cmaes import minimize
 from shared.identification.dataset.types import Dataset
-from shared.identification.fit import BaseFits, Start, fit_without, polish
+from shared.identification.fit import (
+    BaseFits,
+    Fit,
+    Start,
+    _from_elsewhere,  # pyright: ignore[reportPrivateUsage]
+    fit_without,
+    polish,
+)
 from shared.identification.noise import Noise
 from shared.identification.problem import Problem
 from shared.identification.space import Space
 from shared.identification.subject import recorded_of, subject_of
-from tests.measured import measure
+from tests.measured import measure, problem_of
 
 PLANTED = {
     "damping elbow": 0.4, "armature lift": -0.3, "kp pan": 0.2, "kp lift": -0.15,
@@ -55,6 +62,23 @@ def test_a_planted_base_is_found_to_one_percent(tmp_path: Path, begins_at_bound:
     fit = polish(space, start, problem.of("train"), enough=1e-9)
     for each, z in zip(problem.parameters, fit.z, strict=True):
         assert each.value(z) == pytest.approx(each.value(PLANTED[each.name]), rel=0.01), each.name
+
+
+def test_a_second_start_that_leads_to_the_first_fit_ends_there(tmp_path: Path):
+    problem = problem_of(measure(tmp_path, np.random.default_rng(0), seconds=3.0))
+    space, train = Space(problem), problem.of("train")
+    first = polish(space, np.zeros(space.size), train)
+    assert _from_elsewhere(space, np.full(space.size, 0.1), first, train) is first
+
+
+def test_a_second_start_that_finds_better_is_fitted_by_itself(tmp_path: Path):
+    problem = planted(tmp_path)
+    space, train = Space(problem), problem.of("train")
+    stuck = Fit.at(space, np.zeros(space.size), train)
+    found = _from_elsewhere(space, np.full(space.size, 0.1), stuck, train)
+    assert found is not stuck
+    assert found.cost < 0.01 * stuck.cost
+    np.testing.assert_allclose(found.jacobian, Fit.at(space, found.z, train).jacobian)
 
 
 def test_cmaes_finds_the_bottom_of_a_bowl_within_bounds():

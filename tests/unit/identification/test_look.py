@@ -75,6 +75,16 @@ def test_an_interval_that_looks_like_a_delay_of_half_of_it_is_told_from_it():
     assert rough[0].ratio < 0.7 * rough[1].ratio
 
 
+@pytest.mark.parametrize("is_calm", [False, True])
+def test_where_nothing_stands_out_nothing_that_happened_once_is_refitted(
+    bent: tuple[Fit, Start], is_calm: bool
+):
+    once = Candidate(PUSH, "elbow in first")
+    screened, rough = look(*bent, (once,), False, silent, is_calm)
+    assert once in {each.candidate for each in screened}  # people are told of it all the same
+    assert (once in {each.screened.candidate for each in rough}) != is_calm
+
+
 @pytest.mark.parametrize(("push", "looked_at"), [(0.4, True), (0.1, False)])
 def test_what_happened_once_takes_nobodys_place(push: float, looked_at: bool):
     def seen(candidate: Candidate, share: float) -> Screened:
