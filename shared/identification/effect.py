@@ -28,6 +28,8 @@ class Quantity:
     """A size that a good recording shows and that is not extreme: where the search starts."""
     is_smooth: bool = True
     """Whether small changes of it change the motion a little; else it is searched on a grid."""
+    scales: tuple[float, ...] = (1.0,)
+    """Of a smooth one: sizes, in probes, to look at, if what is larger is not more of the same."""
     phase: str = ""
     """Of an interval that comes again and again: the number that says, in intervals, how late its
     first turn is. Such an interval is searched by turns, see ``turns.py``."""

@@ -175,7 +175,9 @@ def _looks(quantities: Sequence[Quantity]) -> list[_Look]:
     sizes = tuple(index for index, each in enumerate(quantities) if not each.grid)
     forms = [index for index, each in enumerate(quantities) if each.grid]
     is_smooth = all(quantities[index].is_smooth for index in sizes)
-    scales = (1.0,) if is_smooth else GRID
+    scales = GRID
+    if is_smooth:
+        scales = tuple(sorted({scale for index in sizes for scale in quantities[index].scales}))
     is_level = not sizes
     if is_level:  # a number that acts from some size on, which its grid is about
         sizes, forms = (0,), forms[1:]

@@ -5,12 +5,16 @@ import numpy as np
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
 from shared.identification.subject import Subject
+from shared.identification.sway import start_swaying
 from shared.identification.vertical import horizontal_axes
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Builder, Edit, Structure
 
-_RINGING = 0.2
-"""About a tenth of critical with 1 kg m^2 of arm."""
+_RINGING = 0.1
+"""A twentieth of critical with 1 kg m^2 of arm (sqrt(kg) m)."""
+
+_SOFT = (0.3, 1.0, 3.0, 8.0)
+"""Times the probe: what is softer also sways more slowly."""
 
 
 class BaseCompliance:
@@ -26,11 +30,16 @@ class BaseCompliance:
         return ("",) if subject.has_tracker else ()
 
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
-        """Return how far it turns under a torque about each axis; 0 is rigid."""
-        return tuple(
-            Quantity(f"about_{axis}", "rad/(N m)", 0.0, 0.02, probe=3e-4)
+        """Return how far it turns under a torque about each axis, 0 is rigid, and its damping.
+
+        That is ``ringing`` times the square root of the stiffness (N m s/rad).
+        """
+        turning = (
+            Quantity(f"about_{axis}", "rad/(N m)", 0.0, 0.02, probe=3e-4, scales=_SOFT)
             for axis in horizontal_axes(subject.nominal.model.opt.gravity)
         )
+        ringing = Quantity("ringing", "sqrt(kg) m", 0.0, 2.0, probe=_RINGING, grid=(_RINGING,))
+        return (*turning, ringing)
 
     def structure(self, subject: Subject, place: str) -> Structure:
         """Return the two joints."""
@@ -47,9 +56,13 @@ class BaseCompliance:
         return (Edit("base", change),)
 
     def enter(self, row: Row, place: str, values: Float64) -> None:
-        """Set the springs."""
-        for axis, compliance in zip(horizontal_axes(row.model.opt.gravity), values, strict=True):
-            row.spring(_joint(axis), float(compliance), _RINGING)
+        """Set the springs, swung by what the arm did before."""
+        axes = horizontal_axes(row.model.opt.gravity)
+        *compliances, ringing = (float(value) for value in values)
+        for axis, compliance in zip(axes, compliances, strict=True):
+            row.spring(_joint(axis), compliance, ringing)
+        if any(compliances):
+            start_swaying(row, [_joint(axis) for axis in axes])
 
 
 def _joint(axis: str) -> str:

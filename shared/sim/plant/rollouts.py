@@ -257,6 +257,10 @@ class Rollouts:
                     joint = self.model.joint(name)
                     load = float(bias[row.index, joint.dofadr[0]])
                     qpos[row.index, joint.qposadr[0]] = rests(load)
+        qvel = self._batch.bind("qvel")
+        for row in rows:
+            for name, speed in row.speeds.items():
+                qvel[row.index, self.model.joint(name).dofadr[0]] = speed
 
     def _open(self, ids: np.ndarray, ctrl: Float64) -> tuple[Float64, Float64]:
         found = self._batch.rollout(

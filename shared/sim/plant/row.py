@@ -143,6 +143,8 @@ class Row:
     rests: dict[str, Callable[[float], float]] = dataclasses.field(
         default_factory=dict[str, Callable[[float], float]]
     )
+    speeds: dict[str, float] = dataclasses.field(default_factory=dict[str, float])
+    """Of added joints at time 0 (rad/s); 0 of the others."""
     encoders: Encoders | None = None
     """What a pose controller knows the arm by; None where they are right, and their joints all
     there are."""
@@ -217,6 +219,17 @@ class Row:
             rests: turns the torque that it has to hold (N m, N) into its position (rad, m).
         """
         self.rests[name] = rests
+
+    def start(self, name: str, place: float, speed: float) -> None:
+        """Let an added joint start anywhere.
+
+        Args:
+            name: in the MJCF.
+            place: (rad, m).
+            speed: (rad/s, m/s).
+        """
+        self.rests[name] = lambda _: place
+        self.speeds[name] = speed
 
     def trust_encoders(self) -> None:
         """Let a pose controller know the arm by its encoders alone: it sees no added joint."""

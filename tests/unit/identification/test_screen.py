@@ -1,21 +1,25 @@
 """The screen: the right candidate comes first, with a size and a form near the truth."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from shared.identification.catalogue.base_compliance import EFFECT as GIVES
+from shared.identification.catalogue.base_compliance import BaseCompliance
 from shared.identification.catalogue.external_contact import EFFECT as PUSH
 from shared.identification.catalogue.joint_spring import EFFECT as SPRING
 from shared.identification.catalogue.stribeck_friction import EFFECT as STRIBECK
 from shared.identification.catalogue.torque_bias import EFFECT as BIAS
 from shared.identification.catalogue.torque_saturation import EFFECT as SATURATION
-from shared.identification.effect import Candidate, Effect
+from shared.identification.effect import Candidate, Effect, Quantity
 from shared.identification.fit import Fit, polish
 from shared.identification.screen import Screened, screen
 from shared.identification.space import Space
+from shared.identification.subject import Subject
 from shared.sim.plant.row import Row
-from tests.arms import JOINTS
+from tests.arms import JOINTS, make_plant, make_subject
 from tests.measured import measure, problem_of
 
 _EFFECTS = (SPRING, STRIBECK, BIAS, SATURATION)
@@ -50,6 +54,27 @@ def test_a_spring_is_found_with_a_rest_in_the_joints_range(tmp_path: Path) -> No
     assert best.candidate.label == "joint_spring elbow"
     assert stiffness == pytest.approx(2.0, rel=0.5)
     assert -0.6 <= rest <= 0.6
+
+
+class _LookedAtOnce(BaseCompliance):
+    def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
+        return tuple(replace(each, scales=(1.0,)) for each in super().quantities(subject, place))
+
+
+def test_what_sways_more_slowly_the_softer_it_is_is_looked_at_soft(tmp_path: Path) -> None:
+    def give(row: Row) -> None:
+        GIVES.enter(row, "", np.array([6e-3, 3e-3, 0.1]))
+
+    structure = GIVES.structure(make_subject(make_plant(tmp_path)), "")
+    problem = problem_of(measure(tmp_path, np.random.default_rng(0), give, structure, seconds=4.0))
+    space, segments = Space(problem), problem.of("train")
+    fit = Fit.at(space, np.zeros(space.size), segments)
+    found, once = (
+        screen(fit, [Candidate(each, "")], segments)[0] for each in (GIVES, _LookedAtOnce())
+    )
+    assert found.share > once.share
+    probe = GIVES.quantities(problem.subject, "")[0].probe
+    assert found.start[0] * probe == pytest.approx(6e-3, rel=0.6)
 
 
 def test_an_effect_without_a_form_is_looked_at_as_before(tmp_path: Path) -> None:

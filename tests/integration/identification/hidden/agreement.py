@@ -51,7 +51,10 @@ def agreement(arm, name, place, size, seed=4, *, nothing=None):
     subject = subject_of(dataset)
     effect = next(each for each in effects() if each.name == name)
     where = found.where
-    values = np.array([each.value for each in found.quantities])
+    told = {each.name: each.value for each in found.quantities}
+    values = np.array(
+        [told.get(each.name, each.probe) for each in effect.quantities(subject, where)]
+    )  # what the truth does not tell of, as the screen has it
     structure = effect.structure(subject, where)
     rollouts = Rollouts(subject.plant, structure, 8) if structure else subject.nominal
     recorded = recorded_of(dataset)

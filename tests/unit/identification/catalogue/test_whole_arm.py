@@ -75,7 +75,7 @@ def test_a_base_that_gives_lets_the_tool_sag_by_hand(subject: Subject):
     compliance = 1e-3
     still = recorded([0.0, 0.0, 0.0], seconds=4.0)
     plain = replay(subject, still)
-    found = replay(subject, still, base_compliance.EFFECT, "", [0.0, compliance])
+    found = replay(subject, still, base_compliance.EFFECT, "", [0.0, compliance, 0.2])
     assert plain.tracker is not None
     assert found.tracker is not None
     np.testing.assert_allclose(found.q[-1], plain.q[-1], atol=1e-3)  # encoders see little of it

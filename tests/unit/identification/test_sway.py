@@ -1,0 +1,84 @@
+"""A part of a recording begins with what the arm stands on as its motion before left it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shared.identification.catalogue.base_compliance import EFFECT as GIVES
+from shared.identification.dataset.types import Float64
+from shared.sim.plant.rollouts import Recorded, Rollouts
+from shared.sim.plant.row import Row
+from shared.sim.plant.signals import Signal, pose_error
+from tests.arms import make_plant, make_subject, recorded
+
+VALUES = np.array([5e-3, 1e-2, 0.1])
+BEGIN = 1.5
+
+
+def swing(at: Float64) -> Float64:
+    return np.stack([0.3 * np.sin(4 * at), 0.4 * np.sin(5 * at), 0.3 * np.sin(7 * at)], axis=1)
+
+
+def gives(row: Row) -> None:
+    GIVES.enter(row, "", VALUES)
+
+
+@pytest.fixture(scope="module")
+def rollouts(tmp_path_factory: pytest.TempPathFactory) -> Rollouts:
+    subject = make_subject(make_plant(tmp_path_factory.mktemp("arm")))
+    return Rollouts(subject.plant, GIVES.structure(subject, ""), 4)
+
+
+@pytest.fixture(scope="module")
+def whole(rollouts: Rollouts) -> tuple[Recorded, Float64, Float64]:
+    """Return a recording, its joints and its tracker."""
+    asked = recorded(swing, seconds=3.0)
+    (found,) = rollouts.run([(gives, asked)])
+    assert found.tracker is not None
+    return asked, found.q, found.tracker
+
+
+def part(asked: Recorded, q: Float64) -> Recorded:
+    """Return what begins in the midst of a recording."""
+    at = asked.joints_at
+    first = int(np.searchsorted(at, BEGIN))
+    speed = (q[first + 1] - q[first - 1]) / (at[first + 1] - at[first - 1])
+    later = at[first:] - at[first]
+    return replace(
+        asked, initial_q=q[first], initial_qd=speed, logged_q=Signal(at - at[first], q),
+        command=asked.command.later(-at[first]), joints_at=later, tracker_at=later,
+        begin=float(at[first]),
+    )  # fmt: skip
+
+
+def test_a_part_sways_as_the_whole_does(
+    rollouts: Rollouts, whole: tuple[Recorded, Float64, Float64]
+):
+    asked, q, tracker = whole
+    (found,) = rollouts.run([(gives, part(asked, q))])
+    still = replace(part(asked, q), logged_q=Signal(np.array([0.0, 0.01]), np.zeros((2, 3))))
+    (at_rest,) = rollouts.run([(gives, still)])
+    assert found.tracker is not None
+    assert at_rest.tracker is not None
+    true = tracker[-len(found.tracker) :]
+    off, without = (
+        np.sqrt(np.mean(pose_error(true, each)[:50, :3] ** 2))
+        for each in (found.tracker, at_rest.tracker)
+    )
+    assert without > 1e-3
+    assert off < 0.2 * without
+
+
+def test_what_begins_with_the_recording_begins_at_rest(rollouts: Rollouts):
+    row = rollouts.entered(gives, recorded(swing, seconds=1.0))
+    assert row.speeds == {}
+    assert set(row.rests) == {"base/about_x", "base/about_y"}
+
+
+def test_too_short_a_motion_says_nothing(
+    rollouts: Rollouts, whole: tuple[Recorded, Float64, Float64]
+):
+    asked, q, _ = whole
+    short = replace(part(asked, q), logged_q=Signal(asked.joints_at[:5] - 0.04, q[:5]))
+    assert rollouts.entered(gives, short).speeds == {}
