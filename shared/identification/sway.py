@@ -12,11 +12,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
-import mujoco
 import numpy as np
 
 from shared.identification.dataset.types import Float64
 from shared.identification.motion import smooth_motion
+from shared.sim.plant.inverse import held_still
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal, sampled
 
@@ -91,29 +91,11 @@ def _before(row: Row, names: Sequence[str]) -> _Before | None:
         done = None
         if (log.at < 0.0).sum() >= _FEWEST:
             is_seen = log.at < _AFTER
-            done = _felt(row, names, log.at[is_seen], log.values[is_seen])
+            motion = smooth_motion(log.at[is_seen], log.values[is_seen])
+            if motion.at[0] < 0.0:
+                load, inertia = held_still(
+                    row.plant, row.model, names, motion.q, motion.qd, motion.qdd
+                )
+                done = _Before(motion.at, load, inertia)
         _known[log] = done
     return _known[row.logged_q]
-
-
-def _felt(row: Row, names: Sequence[str], at: Float64, q: Float64) -> _Before | None:
-    motion = smooth_motion(at, q)
-    if len(motion.at) < 2 or motion.at[0] >= 0.0:
-        return None
-    model = row.model
-    data = mujoco.MjData(model)
-    logged = [model.joint(name) for name in row.plant.joints]
-    places = np.array([int(joint.qposadr[0]) for joint in logged])
-    dofs = np.array([int(joint.dofadr[0]) for joint in logged])
-    own = np.array([int(model.joint(name).dofadr[0]) for name in names])
-    load = np.empty((len(motion.at), len(own)))
-    inertia = np.empty((len(motion.at), len(own), len(own)))
-    whole = np.empty((model.nv, model.nv))
-    for index in range(len(motion.at)):
-        data.qpos[places] = motion.q[index]
-        data.qvel[dofs], data.qacc[dofs] = motion.qd[index], motion.qdd[index]
-        mujoco.mj_inverse(model, data)
-        load[index] = data.qfrc_inverse[own]
-        mujoco.mj_fullM(model, data, whole)
-        inertia[index] = whole[np.ix_(own, own)]
-    return _Before(motion.at, load, inertia)

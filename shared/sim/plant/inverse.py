@@ -1,6 +1,7 @@
 """Torques that a recorded motion takes of the arm as the model has it."""
 
 import copy
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -45,6 +46,39 @@ def inverse_dynamics(
         mujoco.mj_inverse(model, data)
         out[index] = data.qfrc_inverse[dofs]
     return out
+
+
+def held_still(
+    plant: Plant, model: mujoco.MjModel, names: Sequence[str], q: Float64, qd: Float64, qdd: Float64
+) -> tuple[Float64, Float64]:
+    """Return what a motion takes of joints that are not logged to hold them where they are.
+
+    Args:
+        plant: the arm.
+        model: of it, compiled.
+        names: of B such joints, in the MJCF.
+        q: float64[T, J], of the logged joints (rad, m).
+        qd: float64[T, J] (rad/s, m/s).
+        qdd: float64[T, J] (rad/s^2, m/s^2).
+
+    Returns:
+        float64[T, B], the torque, and float64[T, B, B], the inertia that they would turn.
+    """
+    data = mujoco.MjData(model)
+    joints = [model.joint(name) for name in plant.joints]
+    places = np.array([int(joint.qposadr[0]) for joint in joints])
+    dofs = np.array([int(joint.dofadr[0]) for joint in joints])
+    own = np.array([int(model.joint(name).dofadr[0]) for name in names])
+    load = np.empty((len(q), len(own)))
+    inertia = np.empty((len(q), len(own), len(own)))
+    whole = np.empty((model.nv, model.nv))
+    for index in range(len(q)):
+        data.qpos[places], data.qvel[dofs], data.qacc[dofs] = q[index], qd[index], qdd[index]
+        mujoco.mj_inverse(model, data)
+        load[index] = data.qfrc_inverse[own]
+        mujoco.mj_fullM(model, data, whole)
+        inertia[index] = whole[np.ix_(own, own)]
+    return load, inertia
 
 
 def missing_torques(
