@@ -1,5 +1,7 @@
 """A joint's gear has play between motor and link."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from shared.identification.dataset.types import Float64
@@ -7,7 +9,7 @@ from shared.identification.effect import Quantity, Side
 from shared.identification.places import moving, place_of
 from shared.identification.series import link_inertia, seen_by_tracker, series
 from shared.identification.subject import Subject
-from shared.sim.plant.row import Row
+from shared.sim.plant.row import At, Row
 from shared.sim.plant.structure import Structure, series_name
 
 _PART = "gap"
@@ -58,9 +60,21 @@ class Backlash:
         row.trust_encoders()
         seen = seen_by_tracker(row, place)
         if seen is None:
-            row.rest(name, lambda load: -half * float(np.sign(load)))
+            row.rest(name, _Flank(half))
         else:  # where the load is near zero, it does not say on which flank the link lies
-            row.rest(name, lambda _: float(np.clip(seen, -half, half)))
+            row.rest(name, At(float(np.clip(seen, -half, half))))
+
+
+@dataclass(frozen=True)
+class _Flank:
+    """The one that bears the load."""
+
+    half: float
+    """Of the gap (rad, m)."""
+
+    def __call__(self, load: float) -> float:
+        """Return the position (rad, m)."""
+        return -self.half * float(np.sign(load))
 
 
 EFFECT = Backlash()

@@ -371,9 +371,7 @@ def _controls(model: mujoco.MjModel, actuator: int) -> np.ndarray:
 
 
 def _motion_of(row: Row, recorded: Recorded) -> Hashable:
-    """Return what is equal for arms that move alike; nobody's equal where that cannot be told."""
-    if row.rests:
-        return id(row)
+    """Return what is equal for arms that move alike."""
     return (
         id(recorded),
         id(row.command),
@@ -384,6 +382,8 @@ def _motion_of(row: Row, recorded: Recorded) -> Hashable:
         None if row.encoders is None else row.encoders.scale.tobytes(),
         None if row.encoders is None else row.encoders.offset.tobytes(),
         tuple(sorted(row.weights.items())),
+        frozenset(row.rests.items()),
+        frozenset(row.speeds.items()),
     )
 
 

@@ -87,6 +87,38 @@ class TrackerReport:
     """float64[K, 7] in the base frame."""
 
 
+Rest = Callable[[float], float]
+"""Turns the torque that an added joint has to hold (N m, N) into its position (rad, m).
+
+Arms whose joints' are equal, and all else, move alike and are simulated once: a plain function
+equals itself alone.
+"""
+
+
+@dataclass(frozen=True)
+class Sprung:
+    """Where a spring holds."""
+
+    stiffness: float
+    """(N m/rad, N/m)."""
+
+    def __call__(self, load: float) -> float:
+        """Return the position (rad, m)."""
+        return -load / self.stiffness
+
+
+@dataclass(frozen=True)
+class At:
+    """One position, whatever the load."""
+
+    place: float
+    """(rad, m)."""
+
+    def __call__(self, load: float) -> float:
+        """Return the position (rad, m)."""
+        return self.place
+
+
 @dataclass(frozen=True)
 class Encoders:
     """What encoders say of joints q: ``scale * q + offset``."""
@@ -140,9 +172,7 @@ class Row:
     frictions: list[tuple[FrictionLaw, Float64]] = dataclasses.field(
         default_factory=list[tuple[FrictionLaw, Float64]]
     )
-    rests: dict[str, Callable[[float], float]] = dataclasses.field(
-        default_factory=dict[str, Callable[[float], float]]
-    )
+    rests: dict[str, Rest] = dataclasses.field(default_factory=dict[str, Rest])
     speeds: dict[str, float] = dataclasses.field(default_factory=dict[str, float])
     """Of added joints at time 0 (rad/s); 0 of the others."""
     encoders: Encoders | None = None
@@ -203,7 +233,7 @@ class Row:
         joint = self.mj_joint(name)
         dof = int(self.model.jnt_dofadr[joint])
         stiffness = min(1.0 / max(compliance, 1e-12), STIFF)
-        self.rest(name, lambda load: -load / stiffness)
+        self.rest(name, Sprung(stiffness))
         self.field("jnt_stiffness")[joint] = stiffness
         # The second part stills what the armature below would let ring, and is over in a step.
         self.field("dof_damping")[dof] = (
@@ -211,12 +241,12 @@ class Row:
         )
         self.field("dof_armature")[dof] = armature_for(stiffness, self.plant.timestep)
 
-    def rest(self, name: str, rests: Callable[[float], float]) -> None:
+    def rest(self, name: str, rests: Rest) -> None:
         """Let an added joint start where its load leaves it.
 
         Args:
             name: in the MJCF.
-            rests: turns the torque that it has to hold (N m, N) into its position (rad, m).
+            rests: where that is.
         """
         self.rests[name] = rests
 
@@ -228,7 +258,7 @@ class Row:
             place: (rad, m).
             speed: (rad/s, m/s).
         """
-        self.rests[name] = lambda _: place
+        self.rests[name] = At(place)
         self.speeds[name] = speed
 
     def trust_encoders(self) -> None:

@@ -107,6 +107,10 @@ def test_every_hidden_effect_is_in_the_catalogue_by_its_name_quantities_and_unit
             check_numbers(subject, catalogue[name], hidden, arm, dataset)
 
 
+OWN = {("base_compliance", "ringing")}
+"""Effects and numbers that only the catalogue has: a hidden base is damped by another law."""
+
+
 def check_numbers(subject, effect, hidden, arm, dataset):
     from shared.sim.hidden.arms import ARMS
     from shared.sim.hidden.effect import SHAPE, Case, Scene
@@ -122,6 +126,7 @@ def check_numbers(subject, effect, hidden, arm, dataset):
             wanted = {each.name: each.unit for each in effect.quantities(subject, place)}
         else:
             wanted = {each.name: each.unit for each in effect.quantities(subject, "")}
+        wanted = {each: unit for each, unit in wanted.items() if (hidden.name, each) not in OWN}
         low, high = hidden.sizes(scene, place)
         for size in (low, high):
             case = Case(hidden.name, scene, place, size, np.full(SHAPE, 0.4))

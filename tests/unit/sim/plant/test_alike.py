@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from shared.identification.catalogue.base_compliance import EFFECT as GIVES
 from shared.identification.subject import recorded_of, subject_of
 from shared.sim.plant.rollouts import Entry, Recorded, Reports, Rollouts
 from shared.sim.plant.row import JointsReport, Row
@@ -69,3 +70,31 @@ def test_what_moves_otherwise_is_simulated_by_itself(
     for together, one in zip(found, alone, strict=True):
         np.testing.assert_allclose(together.q, one, atol=1e-12)
     assert np.abs(found[0].q - found[1].q).max() > 1e-3
+
+
+def test_arms_whose_added_joints_rest_alike_are_simulated_once(
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+):
+    dataset = measure(tmp_path_factory.mktemp("soft"), np.random.default_rng(0), seconds=1.0)
+    subject = subject_of(dataset)
+    arms = Rollouts(subject.plant, GIVES.structure(subject, ""), 6), recorded_of(dataset)
+
+    def soft(row: Row) -> None:
+        GIVES.enter(row, "", np.array([1e-3, 2e-3, 0.1]))
+
+    def softer(row: Row) -> None:
+        GIVES.enter(row, "", np.array([1e-3, 3e-3, 0.1]))
+
+    def starting(speed: float) -> Entry:
+        def enter(row: Row) -> None:
+            soft(row)
+            row.start("base/about_x", 0.0, speed)
+
+        return enter
+
+    entries = [soft, soft, softer, starting(0.1), starting(0.1), starting(0.2)]
+    found, simulated = run(arms, entries, monkeypatch)
+    assert simulated == 4
+    assert np.array_equal(found[0].q, found[1].q)
+    assert np.array_equal(found[3].q, found[4].q)
+    assert not np.array_equal(found[4].q, found[5].q)
