@@ -108,7 +108,7 @@ def test_tracking_lost_for_a_second_voids_a_bout(stage: Stage):
     assert [state.phase for state in stage.seen][-2:] == ["paused", "void"]
     found = re.search(r"bats were not tracked for ([\d.]+) s", stage.seen[-1].reason)
     assert found is not None, stage.seen[-1].reason
-    assert float(found[1]) > 1.0
+    assert float(found[1]) >= 1.0  # told to a tenth
 
 
 def test_a_killed_referee_stops_the_policy_and_comes_back_ready(stage: Stage):
