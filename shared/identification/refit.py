@@ -74,7 +74,7 @@ def refit(
         ways.append(space.clip(there))
     ways.append(space.clip(np.r_[begun.z, screened.start]))
     known = begun.on(rows)
-    down = _descend(space, ways, begun.jacobian[: len(rows)][rows], picked, fit.space.size)
+    down = _descend(space, ways, known.jacobian, picked, fit.space.size)
     found = [down]
     is_plain = bool(fit.space.candidates) and not any(each.phase for each in quantities)
     is_near = problem.noise.is_measured and 2.0 * fit.cost < _BENT * len(rows)
@@ -145,7 +145,7 @@ def _descend(
     Args:
         space: what is fitted.
         starts: float64[n] each.
-        kept: float64[M, at least ``known``], the derivative without what is known beforehand.
+        kept: float64[at least M, at least ``known``], a derivative; of its rows the first M.
         segments: recordings to fit to.
         known: so many columns of it are.
     """
@@ -156,7 +156,7 @@ def _descend(
     _, own = space.jacobian(z, segments, range(known, space.size))
     rows = len(residual) - space.size
     base = np.zeros((len(residual), known))
-    base[:rows] = kept[:, :known]
+    base[:rows] = kept[:rows, :known]
     base[rows : rows + known] = np.diag(1.0 / space.priors[:known])
     jacobian = np.concatenate([base, own], axis=1)
     return go_down(Fit.of(space, z, residual, jacobian), segments, _DAMPINGS)
@@ -177,9 +177,7 @@ def settle(
         known: a fit to them without the newest candidate.
     """
     if known is not None and turning_of(space) is None:
-        rows = len(known.residual) - known.space.size
-        kept = known.jacobian[:rows]
-        down = _descend(space, [space.clip(start)], kept, segments, known.space.size)
+        down = _descend(space, [space.clip(start)], known.jacobian, segments, known.space.size)
         if _is_straight(known, down):
             return down
         start = down.z

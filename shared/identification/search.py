@@ -16,7 +16,6 @@ from shared.identification.gate import (
     stretches,
 )
 from shared.identification.look import look
-from shared.identification.problem import Variant
 from shared.identification.progress import Progress
 from shared.identification.refit import settle
 from shared.identification.searched import (
@@ -101,7 +100,9 @@ def _round(
         return False
     is_measured = found.problem.noise.is_measured
     is_far = not is_measured or float(found.current_losses.mean()) > _FAR_OFF
-    is_calm = not _stands_out(plain_stretches(found.problem, _now(found), train))
+    now = found.current.space.variant(found.current.z)
+    before = plain_stretches(found.problem, now, train)
+    is_calm = float(before.max()) <= _usually(before)
     screened, roughly = look(found.parts, found.nominal, left, is_far, progress, is_calm)
     for each in screened:
         found.screened.setdefault(each.candidate.label, each)
@@ -114,7 +115,7 @@ def _round(
         fit = settle(space, each.z, train, found.current)
         losses = stretches(found.problem, space.variant(fit.z), test)
         gain, fitted = judged(found, each.screened.candidate, so_far(found), Model(fit, losses))
-        is_event = _explains_event(found, each.screened.candidate, fit, train)
+        is_event = _explains_event(each.screened.candidate, before, fit, train)
         tried.append(Tried(each.screened, fit, gain, losses, is_event, fitted=fitted))
     for one in tried:
         found.tried.setdefault(one.candidate.label, one)
@@ -190,16 +191,23 @@ def _join(found: Search, family: Family) -> None:
     found.current, found.current_losses = family.fit, family.losses
 
 
-def _explains_event(found: Search, candidate: Candidate, fit: Fit, train: tuple[int, ...]) -> bool:
+def _explains_event(
+    candidate: Candidate, before: Float64, fit: Fit, train: tuple[int, ...]
+) -> bool:
     """Return whether a cause that is in one recording takes away what stands out there.
 
     Held-out recordings cannot show what happened once in another one. What stands out must be far
     over everything else, more than noise that is the same throughout would ever be.
+
+    Args:
+        candidate: the cause.
+        before: float64[S], plain losses of stretches without it, of what was fitted to.
+        fit: with it.
+        train: recordings to fit to.
     """
     if candidate.recording is None:
         return False
-    before = plain_stretches(found.problem, _now(found), train)
-    after = plain_stretches(found.problem, fit.space.variant(fit.z), train)
+    after = plain_stretches(fit.space.problem, fit.space.variant(fit.z), train)
     worst = int(np.argmax(before - after))
     most = _usually(before)
     return bool(
@@ -209,19 +217,9 @@ def _explains_event(found: Search, candidate: Candidate, fit: Fit, train: tuple[
     )
 
 
-def _now(found: Search) -> Variant:
-    """Return the model with what was accepted so far."""
-    return found.current.space.variant(found.current.z)
-
-
 def _usually(losses: Float64) -> float:
     """Return what a stretch in which nothing happened leaves at most."""
     return STANDS_OUT * max(float(np.median(losses)), 1.0)
-
-
-def _stands_out(losses: Float64) -> bool:
-    """Return whether something happened once, in any of some stretches."""
-    return bool(losses.max() > _usually(losses))
 
 
 def _sure(useful: list[Tried], train: tuple[int, ...]) -> list[Tried]:

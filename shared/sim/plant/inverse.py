@@ -1,7 +1,7 @@
 """Torques that a recorded motion takes of the arm as the model has it."""
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import mujoco
 import numpy as np
@@ -36,14 +36,9 @@ def inverse_dynamics(
             model.dof_armature, model.dof_damping, model.dof_dampingpoly, model.dof_frictionloss
         ):  # fmt: skip
             field[:] = 0.0
-    data = mujoco.MjData(model)
-    joints = [model.joint(name) for name in plant.joints]
-    places = np.array([int(joint.qposadr[0]) for joint in joints])
-    dofs = np.array([int(joint.dofadr[0]) for joint in joints])
+    dofs = np.array([int(model.joint(name).dofadr[0]) for name in plant.joints])
     out = np.empty_like(q)
-    for index in range(len(q)):
-        data.qpos[places], data.qvel[dofs], data.qacc[dofs] = q[index], qd[index], qdd[index]
-        mujoco.mj_inverse(model, data)
+    for index, data in enumerate(_inverted(plant, model, q, qd, qdd)):
         out[index] = data.qfrc_inverse[dofs]
     return out
 
@@ -64,21 +59,29 @@ def held_still(
     Returns:
         float64[T, B], the torque, and float64[T, B, B], the inertia that they would turn.
     """
-    data = mujoco.MjData(model)
-    joints = [model.joint(name) for name in plant.joints]
-    places = np.array([int(joint.qposadr[0]) for joint in joints])
-    dofs = np.array([int(joint.dofadr[0]) for joint in joints])
     own = np.array([int(model.joint(name).dofadr[0]) for name in names])
     load = np.empty((len(q), len(own)))
     inertia = np.empty((len(q), len(own), len(own)))
     whole = np.empty((model.nv, model.nv))
-    for index in range(len(q)):
-        data.qpos[places], data.qvel[dofs], data.qacc[dofs] = q[index], qd[index], qdd[index]
-        mujoco.mj_inverse(model, data)
+    for index, data in enumerate(_inverted(plant, model, q, qd, qdd)):
         load[index] = data.qfrc_inverse[own]
         mujoco.mj_fullM(model, data, whole)
         inertia[index] = whole[np.ix_(own, own)]
     return load, inertia
+
+
+def _inverted(
+    plant: Plant, model: mujoco.MjModel, q: Float64, qd: Float64, qdd: Float64
+) -> Iterator[mujoco.MjData]:
+    """Yield the arm at each instant of a motion, with the forces that it takes; one object."""
+    data = mujoco.MjData(model)
+    joints = [model.joint(name) for name in plant.joints]
+    places = np.array([int(joint.qposadr[0]) for joint in joints])
+    dofs = np.array([int(joint.dofadr[0]) for joint in joints])
+    for index in range(len(q)):
+        data.qpos[places], data.qvel[dofs], data.qacc[dofs] = q[index], qd[index], qdd[index]
+        mujoco.mj_inverse(model, data)
+        yield data
 
 
 def missing_torques(
