@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 import warnings
+import xmlrpc.client
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,6 +23,13 @@ _START_SECONDS: Final = 5.0
 def has_ros_master() -> bool:
     """Return whether Debian's package is installed."""
     return Path(DEBIAN, "rosmaster").is_dir()
+
+
+class _Closed(xmlrpc.client.ServerProxy):
+    """Closes its connection when nobody has it any more; the master's threads leave theirs open."""
+
+    def __del__(self) -> None:
+        self("close")()
 
 
 class RosMaster:
@@ -49,6 +57,8 @@ class RosMaster:
             warnings.simplefilter("ignore", DeprecationWarning)  # it is older than Python 3.10
             handler: Any = importlib.import_module("rosmaster.master_api").ROSMasterHandler()
         make: Any = importlib.import_module("rosgraph.xmlrpc").XmlRpcNode
+        util: Any = importlib.import_module("rosmaster.util")
+        util.ServerProxy = _Closed
         self._node: Any = make(port, handler, _leave)
         before = os.environ.get("ROS_IP")
         os.environ["ROS_IP"] = host  # the one way to tell it where to listen
