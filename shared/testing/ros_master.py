@@ -29,7 +29,8 @@ class _Closed(xmlrpc.client.ServerProxy):
     """Closes its connection when nobody has it any more; the master's threads leave theirs open."""
 
     def __del__(self) -> None:
-        self("close")()
+        with contextlib.suppress(AttributeError):  # of an address that it was not made for
+            self("close")()
 
 
 class RosMaster:
