@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 import warnings
+import weakref
 import xmlrpc.client
 from pathlib import Path
 from typing import Any, Final
@@ -28,9 +29,9 @@ def has_ros_master() -> bool:
 class _Closed(xmlrpc.client.ServerProxy):
     """Closes its connection when nobody has it any more; the master's threads leave theirs open."""
 
-    def __del__(self) -> None:
-        with contextlib.suppress(AttributeError):  # of an address that it was not made for
-            self("close")()
+    def __init__(self, uri: str) -> None:
+        super().__init__(uri)
+        weakref.finalize(self, self("transport").close)
 
 
 class RosMaster:
