@@ -49,7 +49,8 @@ rehearse: $(STAMP) ## a PR2, a Vive, a strap and a sound card that are not there
 	@$(BIN)/python -m tests.integration.full_stack.rehearsal $(ARGS)
 
 test: $(STAMP) ## unit, property, integration and replay tests
-	@$(BIN)/pytest -q -m "not slow and not chaos and not hardware and not gpu and not bench" \
+	@$(BIN)/pytest -q -n 2 --no-loadscope-reorder \
+	  -m "not slow and not chaos and not hardware and not gpu and not bench" \
 	  --ignore=tests/chaos --ignore=tests/hardware --ignore=tests/bench tests $(TEST_FLAGS)
 
 test-all: $(STAMP) ## every test that needs no robot

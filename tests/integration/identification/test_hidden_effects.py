@@ -1,14 +1,8 @@
 """The fast tier: an effect is hidden in an arm, noise and unknown parameters around it; find it.
 
 The generator is another implementation than the finder's, at a finer time step. `riposte bench
-identify` runs the whole protocol, with other seeds. Two processes look at the data sets of the
-tests that were chosen, so that both cores of a small machine work.
+identify` runs the whole protocol, with other seeds.
 """
-
-import multiprocessing
-import os
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 
 import pytest
 
@@ -17,11 +11,9 @@ from shared.identification.hidden.generator import simulated
 from shared.identification.hidden.recipe import Recipe, wish_of
 from shared.identification.hidden.truth import Truth
 from shared.identification.verdict import Verdict
-from shared.runtime.process import THREAD_LIMITS
 
 pytestmark = pytest.mark.timeout(400)
 
-PROCESSES = 2
 HIDDEN = (
     ("command_latency=0.02", 9003),
     ("payload=0.6", 9004),
@@ -35,7 +27,6 @@ HIDDEN = (
     ("gravity_tilt=0.06", 9012),
 )
 ONE_POSTURE = ("torque_bias@shoulder=5", 9201)
-Look = Callable[[str, int], tuple[Truth, Verdict]]
 
 
 def looked_at(wish: str, seed: int) -> tuple[Truth, Verdict]:
@@ -50,25 +41,9 @@ def looked_at(wish: str, seed: int) -> tuple[Truth, Verdict]:
     return truth, identify(dataset).verdict
 
 
-@pytest.fixture(scope="module")
-def look(request: pytest.FixtureRequest) -> Iterator[Look]:
-    os.environ.update(THREAD_LIMITS)
-    chosen = [
-        (str(item.callspec.params["wish"]), int(str(item.callspec.params["seed"])))
-        for item in request.session.items
-        if isinstance(item, pytest.Function) and item.path == request.path
-    ]
-    spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(PROCESSES, mp_context=spawn) as pool:
-        found = {job: pool.submit(looked_at, *job) for job in chosen}
-        yield lambda wish, seed: found[wish, seed].result(timeout=300)
-        for each in found.values():
-            each.cancel()
-
-
 @pytest.mark.parametrize(("wish", "seed"), HIDDEN)
-def test_what_is_hidden_is_found_where_it_is(look: Look, wish: str, seed: int) -> None:
-    truth, verdict = look(wish, seed)
+def test_what_is_hidden_is_found_where_it_is(wish: str, seed: int) -> None:
+    truth, verdict = looked_at(wish, seed)
     hidden = truth.effect[0]
     assert verdict.verdict == "named", verdict.sentence
     assert [(cause.effect, cause.where) for cause in verdict.causes] == [
@@ -79,8 +54,8 @@ def test_what_is_hidden_is_found_where_it_is(look: Look, wish: str, seed: int) -
 
 
 @pytest.mark.parametrize(("wish", "seed"), [("", seed) for seed in range(9101, 9111)])
-def test_where_nothing_is_hidden_nothing_is_named(look: Look, wish: str, seed: int) -> None:
-    truth, verdict = look(wish, seed)
+def test_where_nothing_is_hidden_nothing_is_named(wish: str, seed: int) -> None:
+    truth, verdict = looked_at(wish, seed)
     assert not truth.effect
     assert not verdict.causes, verdict.sentence
     allowed = ("none", "unexplained", "base_too_coarse") if seed % 2 == 0 else ("none",)
@@ -88,11 +63,9 @@ def test_where_nothing_is_hidden_nothing_is_named(look: Look, wish: str, seed: i
 
 
 @pytest.mark.parametrize(("wish", "seed"), [ONE_POSTURE])
-def test_what_a_base_far_from_the_model_explains_is_told_from_nothing(
-    look: Look, wish: str, seed: int
-) -> None:
+def test_what_a_base_far_from_the_model_explains_is_told_from_nothing(wish: str, seed: int) -> None:
     """Near one posture: a weak servo, a torque, and a counterbalance out of adjustment."""
-    truth, verdict = look(wish, seed)
+    truth, verdict = looked_at(wish, seed)
     assert verdict.verdict == "tie", verdict.sentence
     (tie,) = verdict.ties
     first, *others = tie.causes

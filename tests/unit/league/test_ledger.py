@@ -95,6 +95,13 @@ def test_a_second_writer_is_turned_away_and_readers_are_not(tmp_path: Path) -> N
     Ledger(tmp_path / "l").close()
 
 
+def open_to_all(folder: Path) -> None:
+    """Let any user into a folder of pytest's, which are ours alone."""
+    for each in (folder, *folder.parents):
+        if each.stat().st_uid == os.getuid() and each.stat().st_mode & 0o777 == 0o700:
+            each.chmod(0o755)
+
+
 def test_a_reader_needs_no_writable_folder(tmp_path: Path) -> None:
     path = written(tmp_path / "l")
     path.with_name("l.lock").unlink()
@@ -106,8 +113,7 @@ def test_a_reader_needs_no_writable_folder(tmp_path: Path) -> None:
     )
     tmp_path.chmod(0o555)
     os.chmod(path, 0o444)
-    for parent in (tmp_path.parent, tmp_path.parent.parent):
-        parent.chmod(0o755)
+    open_to_all(tmp_path.parent)
     done = subprocess.run(
         [sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=False
     )
@@ -125,8 +131,7 @@ def test_a_ledger_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
         "try:\n    Ledger(pathlib.Path(sys.argv[1]))\n"
         "except LedgerError as error:\n    print(error)"
     )
-    for parent in (tmp_path.parent, tmp_path.parent.parent):
-        parent.chmod(0o755)
+    open_to_all(tmp_path.parent)
 
     def said(folder: int, file: int, lock: int) -> str:
         tmp_path.chmod(folder)
