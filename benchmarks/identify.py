@@ -3,17 +3,18 @@
 The protocol is in ``identification/protocol.py``; every finished data set is a line of
 ``runs/identify-COMMIT.jsonl``, so that a second call goes on. All of it takes hours; a share, or
 what is done in so many minutes: ``python -m benchmarks.identify --share 0.05 --minutes 30``, and
-with ``--skip`` others than those that code was mended by.
+with ``--skip`` others than those that code was mended by; ``--cells tie`` runs one part of it.
 """
 
 import argparse
 import shlex
 import sys
 import tempfile
+from collections.abc import Collection
 from pathlib import Path
 
 from benchmarks.harness import ROOT
-from benchmarks.identification.protocol import protocol, smoke
+from benchmarks.identification.protocol import CELLS, protocol, smoke
 from benchmarks.identification.running import PROCESSES, run
 from benchmarks.identification.table import checks_of, confusion, confusion_text, curve
 from services.jobs.bench import RESULTS, Check, Measurement, keep, report_of, text_of
@@ -40,7 +41,7 @@ def default_path() -> Path:
 
 def measured(
     path: Path, share: float, processes: int = PROCESSES, minutes: float | None = None,
-    baselines_every: int = BASELINES_EVERY, skipped: int = 0,
+    baselines_every: int = BASELINES_EVERY, skipped: int = 0, cells: Collection[str] = CELLS,
 ) -> Measurement:  # fmt: skip
     """Run a share of the protocol, or go on with it; 0 is the smoke test.
 
@@ -51,15 +52,17 @@ def measured(
         minutes: after which no data set is begun; None for as long as it takes.
         baselines_every: on every so many data sets the baselines run, too; 0: on none.
         skipped: so many data sets of the order are left out.
+        cells: what is run of the others.
 
     Raises:
-        RiposteError: no single effect was looked for in that time.
+        RiposteError: no data set, or of all cells none with one effect, was done in that time.
     """
     trials = protocol(share) if share else smoke()
     every = baselines_every if share else 0
-    records = run(trials, path, every, processes, minutes, skipped)
+    records = run(trials, path, every, processes, minutes, skipped, cells)
     first, *others = checks_of(records)
-    if not first.name.startswith("right effect"):
+    is_of_effects = first.name.startswith("right effect")
+    if not others or ("single" in cells and not is_of_effects):
         raise RiposteError(f"no data set with one effect was done, of {len(records)}")
     others.append(Check(name=f"data sets done, of {len(trials)}", value=float(len(records))))
     print(confusion_text(records), file=sys.stderr)
@@ -67,7 +70,7 @@ def measured(
     baseline = next((names[name] for name in names if "all_at_once: right" in name), None)
     return Measurement(
         value=first.value,
-        unit="share of hidden effects named",
+        unit="share of hidden effects named" if is_of_effects else "share of data sets",
         limit=baseline.value if baseline else 0.0,
         ratio=first,
         runs=tuple(records),
@@ -91,6 +94,10 @@ def main() -> int:
         "--skip", type=int, default=0, metavar="N",
         help="data sets of the order to leave out, which earlier rows are of (%(default)s)",
     )  # fmt: skip
+    parser.add_argument(
+        "--cells", nargs="+", choices=CELLS, default=CELLS, metavar="CELL",
+        help=f"of the protocol: {', '.join(CELLS)} (all)",
+    )  # fmt: skip
     parser.add_argument("--write", action="store_true", help=f"add a row to benchmarks/{RESULTS}")
     found = parser.parse_args()
     if not 0.0 < found.share <= 1.0 or found.processes < 1:
@@ -105,7 +112,7 @@ def main() -> int:
     def share() -> Measurement:
         return measured(
             found.out, found.share, found.processes, found.minutes, found.baselines_every,
-            found.skip,
+            found.skip, found.cells,
         )  # fmt: skip
 
     try:

@@ -5,7 +5,7 @@ Seeds begin at 20 000; those below 10 000 are for development.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal, get_args
 
 from shared.identification.hidden.recipe import Recipe, Wish
 from shared.sim.hidden.arms import ARMS, ArmName
@@ -18,6 +18,7 @@ PAIRS = 60
 OUTSIDE = 40
 TIES = 20
 Cell = Literal["single", "null", "null_imperfect", "two", "outside", "tie"]
+CELLS: Final[tuple[str, ...]] = get_args(Cell)
 _ARMS: tuple[ArmName, ...] = ("pr2", "arm3")
 """By turns; effects that neither can have go to ``torque2``."""
 
@@ -112,15 +113,16 @@ def _outside(count: int) -> Iterator[Trial]:
 
 
 def _ties(count: int) -> Iterator[Trial]:
-    """Return two causes near one posture, where they are the same torque.
+    """Return two causes near one posture, where they are the same torque, as is a servo's gain.
 
-    Of the shoulder, which carries weight, and just as far as shows a torque at all (0.05 rad): an
-    elbow's counterbalance is a gain off by less than a model file may be.
+    Of the shoulder, which carries weight, and just as far as shows a torque at all (0.05 rad). Half
+    of its 6 N m more or less is a gain off by as much as a model file may be; these are larger.
     """
     for turn in range(count):
-        name = ("torque_bias", "counterbalance")[turn % 2]
+        name, most = (("torque_bias", 6.0), ("counterbalance", 1.0))[turn % 2]
+        size = most * (0.7 + 0.3 * turn / count)
         recipe = Recipe(
-            arm="arm3", seed=FIRST_SEED + 14_000 + turn, reach=0.08, shares=(0.8, 0.95),
-            wishes=(Wish(name, "shoulder"),),
+            arm="arm3", seed=FIRST_SEED + 14_000 + turn, reach=0.08,
+            wishes=(Wish(name, "shoulder", size),),
         )  # fmt: skip
         yield Trial("tie", recipe)

@@ -7,19 +7,20 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.identification.baselines import baselines
-from benchmarks.identification.judging import record_of
-from benchmarks.identification.protocol import Trial
+from benchmarks.identification.judging import judged, record_of
+from benchmarks.identification.protocol import CELLS, Trial
 from shared.clock import SystemClock
 from shared.errors import RiposteError
 from shared.identification.find import identify
-from shared.identification.hidden.generator import hide
+from shared.identification.hidden.generator import hide, simulated
 from shared.identification.hidden.truth import read_truth
 from shared.runtime.build import commit
 from shared.runtime.process import THREAD_LIMITS
@@ -48,6 +49,7 @@ def run(
     processes: int = PROCESSES,
     minutes: float | None = None,
     skipped: int = 0,
+    cells: Collection[str] = CELLS,
 ) -> list[dict[str, Any]]:
     """Return the records of all trials that are done, those done before included.
 
@@ -60,8 +62,9 @@ def run(
         processes: how many at once.
         minutes: after which no trial is begun; None for as long as it takes.
         skipped: so many of the first are left out: those that code was mended by.
+        cells: of which trials are run.
     """
-    trials = by_turns(trials)[skipped:]
+    trials = [trial for trial in by_turns(trials)[skipped:] if trial.cell in cells]
     ends_at = None if minutes is None else SystemClock().now() + 60.0 * minutes
     done = {record["key"] for record in finished(path)}
     left = [
@@ -121,10 +124,22 @@ def one(job: tuple[Trial, bool, float | None]) -> dict[str, Any] | None:
         except RiposteError as error:
             return {"key": trial.key, "cell": trial.cell, "error": str(error), "commit": commit()}
         record = record_of(trial, truth, finding.verdict, cpu_s)
+        if trial.cell == "tie" and finding.verdict.ties:
+            record["is_told_apart"] = _is_told_apart(trial)
         record["commit"] = commit()
         if with_baselines:
             record["baselines"] = baselines(dataset, trial.recipe.seed, steps)
     return record
+
+
+def _is_told_apart(trial: Trial) -> bool:
+    """Return whether the truth of a tie is named from the motion that the tie asks for.
+
+    That is all over where the arm may go, held, swung and crept along.
+    """
+    dataset, truth = simulated(replace(trial.recipe, reach=1.0))
+    verdict = identify(dataset, seed=trial.recipe.seed).verdict
+    return judged(record_of(trial, truth, verdict, 0.0)).has_place
 
 
 def _said(record: dict[str, Any]) -> str:

@@ -54,6 +54,8 @@ def checks_of(records: Sequence[dict[str, Any]]) -> tuple[Check, ...]:
         _rate("outside: a wrong name", cells["outside"], _is_false, 0.10, "at most"),
         _rate("structural tie reported", cells["tie"], lambda each: each.is_tied, 1.0),
     ]
+    apart = [record["is_told_apart"] for record in done if "is_told_apart" in record]
+    found.append(_share("what a tie asks for tells it", sum(apart), len(apart), 0.90))
     outside = [record for record in done if record["cell"] == "outside"]
     raised = sum(bool(record["unexplained"]) or not record["named"] for record in outside)
     found.append(_share("outside: unexplained raised", raised, len(outside), 0.90))

@@ -2,9 +2,9 @@
 
 Near one posture a weak servo sags as under a constant torque, so a base whose gains may be anything
 explains a torque that nobody then looks for. Between the two lies a valley: at its one end the base
-is far from the model file, at the other a cause is large. Where the base went far, each candidate
-gets the chance to bring it back, by what is usually known of a model file; one that does, and
-explains as much, is no less likely than a base so far off.
+is far from the model file, at the other a cause is large. Where the base went far, the candidates
+that explain most of what the file gets wrong are fitted beside a base of which the file is believed
+as it usually may be; one that explains as much is no less likely than a base so far off.
 """
 
 from collections.abc import Sequence
@@ -18,6 +18,7 @@ from shared.identification.certainty import half_widths, is_there
 from shared.identification.dataset.types import Float64
 from shared.identification.fit import WINDOW, Fit, polish
 from shared.identification.gate import compare, stretches
+from shared.identification.places import moving
 from shared.identification.problem import Problem
 from shared.identification.progress import Progress
 from shared.identification.screen import Screened, screen
@@ -32,9 +33,11 @@ FAR = 0.5
 that a model file gives, as a share of it."""
 NEARBY = 0.2
 """Standard deviation of the same, in a model file that is about right."""
+_POSTURE = 0.2
+"""Travel that changes the lever of a weight by a fifth at most (rad)."""
 _TRIED = 4
 """Candidates that get the chance."""
-_MOST = 0.8
+_MOST = 0.5
 """Of what the best of them explains: what explains less gets none."""
 _STEPS, _ENOUGH = 12, 1e-4
 """Of a fit: what pulls a base back is a small part of the cost."""
@@ -43,8 +46,8 @@ _TOLD = 5
 _SPOILED = 1.2
 """Times what the model file leaves, that a fit which carries over never does."""
 _SLIGHT = 15.0
-"""What a cause must take off what speaks against the base, a sum of squares of standard deviations
-halved: one number that is 5.5 of them off."""
+"""What a cause must take off the cost, what speaks against the base included: half a sum of squares
+of standard deviations, as one number makes that is 5.5 of them off."""
 
 
 def otherwise(found: Search, progress: Progress) -> Otherwise | None:
@@ -63,16 +66,14 @@ def otherwise(found: Search, progress: Progress) -> Otherwise | None:
     problem = replace(found.problem, parameters=_known(found.problem))
     train, test = problem.of("train"), problem.of("test")
     base = _along(Space(problem), _placed(found.base, problem))
-    if not _surely_far(base):
+    if not _surely_far(base) and not (_stays(problem) and _against(base) > _SLIGHT):
         return None
-    near = base.z.copy()
-    near[list(_far(base))] = 0.0
     tried: list[Tried] = []
-    instead = _instead(found, base.space, near)
+    instead = _instead(found, base.space)
     for index, each in enumerate(instead):
         progress("refit", index / len(instead), each.candidate.label)
         space = base.space.grown(each.candidate)
-        fit = _along(space, np.r_[near, each.start])
+        fit = _along(space, np.r_[each.shift, each.start])
         losses = stretches(problem, space.variant(fit.z), test)
         is_sure = is_there(fit, each.candidate, train)
         if is_sure and _brings_back(base, fit) and not _is_worse(losses, found.base_losses):
@@ -81,7 +82,7 @@ def otherwise(found: Search, progress: Progress) -> Otherwise | None:
     if not tried:
         return None
     tried.sort(key=lambda each: each.gain.loss)
-    return Otherwise(base, tuple(tried), _alike(base, near, tried))
+    return Otherwise(base, tuple(tried), _alike(base, tried))
 
 
 def _along(space: Space, begun: Float64) -> Fit:
@@ -89,31 +90,30 @@ def _along(space: Space, begun: Float64) -> Fit:
     return polish(space, begun, space.problem.of("train"), _STEPS, _ENOUGH)
 
 
-def _instead(found: Search, space: Space, near: Float64) -> list[Screened]:
-    """Return the candidates that explain most of what a base near the model file leaves.
+def _stays(problem: Problem) -> bool:
+    """Return whether a joint that turns stays where its weight is a constant torque."""
+    turning = (place for place in moving(problem.subject) if not place.is_sliding)
+    return any(place.travel < _POSTURE for place in turning)
 
-    The base stays where it is: it could take over from any of them.
-    """
+
+def _instead(found: Search, space: Space) -> list[Screened]:
+    """Return the candidates that explain most of what no base near the model file does."""
     parts = Space(space.problem.in_parts(WINDOW))
     pieces = parts.problem.of("train")
-    residual = parts.residual([near], pieces)[0]
-    jacobian = np.zeros((len(residual), space.size))
-    jacobian[-space.size :] = np.diag(1.0 / space.priors)
+    file = Fit.at(parts, np.zeros(space.size), pieces)
     steady = [each for each in found.candidates if each.recording is None]
-    screened = screen(Fit.of(parts, near, residual, jacobian), steady, pieces)
+    screened = screen(file, steady, pieces)
     return [each for each in screened if each.share > _MOST * screened[0].share][:_TRIED]
 
 
-def _against(base: Fit, z: Float64) -> float:
+def _against(base: Fit) -> float:
     """Return what speaks against a base, as part of the cost: half a sum of squares."""
-    return 0.5 * float(np.sum((z / base.space.priors) ** 2))
+    return 0.5 * float(np.sum((base.z / base.space.priors) ** 2))
 
 
 def _brings_back(base: Fit, fit: Fit) -> bool:
     """Return whether less is far from the model file in a fit, and that says something."""
-    before, after = set(_far(base)), set(_far(fit))
-    gain = _against(base, base.z) - _against(base, fit.z[: base.z.size])
-    return after < before and gain > _SLIGHT
+    return set(_far(fit)) < set(_far(base)) and base.cost - fit.cost > _SLIGHT
 
 
 def _is_worse(losses: Float64, than: Float64) -> bool:
@@ -122,10 +122,11 @@ def _is_worse(losses: Float64, than: Float64) -> bool:
     return margin.gain > margin.error
 
 
-def _alike(base: Fit, near: Float64, tried: Sequence[Tried]) -> float:
+def _alike(base: Fit, tried: Sequence[Tried]) -> float:
     """Return the smallest cosine between what a base explains by going far, and what causes do."""
     count = len(base.residual) - base.space.size
-    left = base.space.residual([near], base.space.problem.of("train"))[0][:count]
+    file = np.zeros(base.space.size)
+    left = base.space.residual([file], base.space.problem.of("train"))[0][:count]
     one = left - base.residual[:count]
     others = [left - each.fit.residual[:count] for each in tried]
     return min(

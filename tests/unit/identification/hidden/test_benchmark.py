@@ -91,6 +91,37 @@ def test_data_sets_that_earlier_rows_are_of_can_be_left_out(tmp_path):
     assert [each["key"] for each in found] == [order[3].key]
 
 
+def test_one_part_of_the_protocol_can_be_run_alone(tmp_path):
+    path = tmp_path / "records.jsonl"
+    order = by_turns(protocol(0.05))
+    path.write_text("".join(json.dumps(record(key=each.key)) + "\n" for each in order))
+    found = run(protocol(0.05), path, 0, processes=1, minutes=0.0, cells=("tie",))
+    assert [each["key"] for each in found] == [each.key for each in order if each.cell == "tie"]
+
+
+def test_ties_are_of_causes_that_no_gain_is_off_enough_for():
+    ties = [each for each in protocol() if each.cell == "tie"]
+    assert {each.recipe.reach for each in ties} == {0.08}
+    for each in ties:
+        (wish,) = each.recipe.wishes
+        most = {"torque_bias": 6.0, "counterbalance": 1.0}[wish.name]
+        assert 0.69 < wish.size / most < 1.0
+
+
+def test_a_tie_is_counted_and_whether_what_it_asks_for_tells_it():
+    hidden = [effect("bias", "elbow")]
+    tie = [cause("bias", "elbow"), cause("spring", "elbow")]
+    tied = record("tie", hidden=hidden, ties=[tie], verdict="tie")
+    records = [
+        {**tied, "is_told_apart": True},
+        {**tied, "is_told_apart": False},
+        record("tie", hidden=hidden, verdict="none"),
+    ]
+    values = {check.name: check.value for check in checks_of(records)}
+    assert values["structural tie reported (n = 3)"] == pytest.approx(2 / 3)
+    assert values["what a tie asks for tells it (n = 2)"] == 0.5
+
+
 def test_rates_of_the_table_are_those_of_the_records():
     hidden = [effect("payload")]
     records = [
