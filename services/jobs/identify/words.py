@@ -117,12 +117,10 @@ def floor_text(held_out: HeldOut) -> str:
     )
 
 
-def tie_text(tie: Tie) -> str:
-    """Return a tie in a line."""
-    names = " or ".join(
-        f"{cause.title}{f' at {cause.where}' if cause.where else ''}" for cause in tie.causes
-    )
-    return f"{names}: alike to {number_text(tie.alike)}"
+def tie_texts(tie: Tie) -> list[str]:
+    """Return a tie, a line each: what it would be, and how large, then how alike they are."""
+    first, *others = map(cause_text, tie.causes)
+    return [first, *(f"or {other}" for other in others), f"alike to {number_text(tie.alike)} of 1"]
 
 
 def unexplained_text(left: Unexplained, held_out: HeldOut) -> str:
@@ -164,7 +162,7 @@ def verdict_text(verdict: Verdict, folder: Path) -> str:
             )
 
     add("cause", [cause_text(cause) for cause in verdict.causes])
-    add("either", [tie_text(tie) for tie in verdict.ties])
+    add("either", [text for tie in verdict.ties for text in tie_texts(tie)])
     add("held out", [held_out_text(verdict.held_out)])
     if verdict.causes:
         share = share_text(verdict.held_out.share_removed, verdict.held_out.share_interval)

@@ -105,7 +105,7 @@ def test_the_last_lines_say_the_verdict_and_where_the_report_is(word: str) -> No
     assert verdict.sentence in flat
     assert "out/report.html" in flat
     assert flat.count("beware") == (not verdict.starts_agree)
-    for cause in verdict.causes:
+    for cause in (*verdict.causes, *(each for tie in verdict.ties for each in tie.causes)):
         assert quantity_text(cause.value, cause.unit, cause.interval) in flat
     for sentence in verdict.record_next:
         assert sentence in flat
