@@ -43,6 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--gentle", action="store_true", help="slow motion by hand, not motion that was designed"
     )
+    parser.add_argument(
+        "--reach", type=float, default=1.0, metavar="R",
+        help="how far motion goes, of what the arm may: 0.08 stays near one posture (%(default)s)",
+    )  # fmt: skip
     parser.add_argument("--no-tracker", action="store_true", help="log joints only")
     parser.add_argument(
         "--seed", type=int, default=0, metavar="S", help="of everything random (%(default)s)"
@@ -96,6 +100,7 @@ def _recipe(arguments: argparse.Namespace) -> Recipe:
         is_gentle=arguments.gentle,
         has_tracker=not arguments.no_tracker,
         seed=arguments.seed,
+        reach=arguments.reach,
         seconds=arguments.seconds,
         train=int(split["train"]),
         test=int(split["test"]),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from services.cli import main
+from shared.identification.dataset.reading import read_dataset
 from shared.identification.dataset.types import Dataset
 from shared.identification.dataset.writing import write_dataset
 from tests.integration.identify_job.arms import pendulum_dataset
@@ -61,6 +62,20 @@ def test_a_subcommand_is_told_from_a_folder_of_its_name(
     assert left.value.code == 0
     assert "usage: riposte identify import-bag" in capsys.readouterr().out
     assert "dataset.toml" in complaint(capsys, "./import-bag")
+
+
+def test_motion_can_be_kept_near_one_posture(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "set"
+    words = ["identify", "simulate", str(folder), "--arm", "arm3", "--null", "--seconds", "3"]
+    assert main([*words, "--trajectories", "1+1", "--reach", "0.08"]) == 0
+    capsys.readouterr()
+    for each in read_dataset(folder).trajectories:
+        assert np.ptp(each.q, axis=0).max() < 0.3
+    assert "reach must be between 0.01 and 1, got 2" in complaint(
+        capsys, "simulate", str(tmp_path / "other"), "--reach", "2"
+    )
 
 
 @pytest.mark.slow
