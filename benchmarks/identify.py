@@ -63,7 +63,8 @@ def measured(
     first, *others = checks_of(records)
     is_of_effects = first.name.startswith("right effect")
     if not others or ("single" in cells and not is_of_effects):
-        raise RiposteError(f"no data set with one effect was done, of {len(records)}")
+        wanted = "data set with one effect" if "single" in cells else "data set"
+        raise RiposteError(f"no {wanted} was done, of {len(records)}")
     others.append(Check(name=f"data sets done, of {len(trials)}", value=float(len(records))))
     print(confusion_text(records), file=sys.stderr)
     names = {check.name: check for check in others}

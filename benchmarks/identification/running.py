@@ -121,11 +121,11 @@ def one(job: tuple[Trial, bool, float | None]) -> dict[str, Any] | None:
                 without=tuple(sorted(trial.without)),
             )
             cpu_s = time.process_time() - begin
+            record = record_of(trial, truth, finding.verdict, cpu_s)
+            if trial.cell == "tie" and finding.verdict.ties:
+                record["is_told_apart"] = _is_told_apart(trial)
         except RiposteError as error:
             return {"key": trial.key, "cell": trial.cell, "error": str(error), "commit": commit()}
-        record = record_of(trial, truth, finding.verdict, cpu_s)
-        if trial.cell == "tie" and finding.verdict.ties:
-            record["is_told_apart"] = _is_told_apart(trial)
         record["commit"] = commit()
         if with_baselines:
             record["baselines"] = baselines(dataset, trial.recipe.seed, steps)
