@@ -25,7 +25,10 @@ def turn(nodeid: str) -> int:
 def company(nodeid: str) -> str:
     """Return a name that a test shares with those that stay with its worker."""
     file = _file(nodeid)
-    return {"": nodeid, "files": file}.get(kind := _kind(file), kind)
+    kind = _kind(file)
+    if not kind:
+        return nodeid
+    return file if kind == "files" else kind
 
 
 def _file(nodeid: str) -> str:
