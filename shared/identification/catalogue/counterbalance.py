@@ -10,7 +10,8 @@ from shared.identification.effect import Quantity, Side
 from shared.identification.places import place_of
 from shared.identification.subject import Subject
 from shared.sim.plant.inverse import inverse_dynamics
-from shared.sim.plant.row import Row, Step
+from shared.sim.plant.row import Row
+from shared.sim.plant.step import Step
 from shared.sim.plant.structure import Structure
 
 _POSTURES = 9

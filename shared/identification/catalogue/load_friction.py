@@ -7,7 +7,8 @@ from shared.identification.effect import Quantity, Side
 from shared.identification.passive import at_joint
 from shared.identification.places import moving
 from shared.identification.subject import Subject
-from shared.sim.plant.row import Row, Step
+from shared.sim.plant.row import Row
+from shared.sim.plant.step import Step
 from shared.sim.plant.structure import Structure
 
 

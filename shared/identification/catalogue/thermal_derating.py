@@ -20,8 +20,9 @@ from shared.identification.passive import at_joint
 from shared.identification.places import moving, place_of
 from shared.identification.subject import Subject
 from shared.sim.plant.inverse import inverse_dynamics
-from shared.sim.plant.row import Row, Step
+from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal
+from shared.sim.plant.step import Step
 from shared.sim.plant.structure import Structure
 
 MEMORY = 120.0

@@ -6,7 +6,8 @@ from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
 from shared.identification.places import moving
 from shared.identification.subject import Subject
-from shared.sim.plant.row import Row, Step, drives_of
+from shared.sim.plant.row import Row, drives_of
+from shared.sim.plant.step import Step
 from shared.sim.plant.structure import Structure
 
 

@@ -34,7 +34,8 @@ class Controllers:
             capacity: the most arms at once.
         """
         known = compiled(plant, ())
-        known.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+        unused = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_SENSOR
+        known.opt.disableflags |= int(unused)
         self._known = known
         # Each arm twice: where its encoders say that it is, and where its links are.
         self._batch = mujoco.batch.Batch(known, nsim=2 * capacity, nthread=1)
@@ -91,7 +92,7 @@ class Controllers:
             qvel: float64[K, V].
         """
         count = len(self.rows)
-        ids = np.arange(2 * count)
+        ids = np.arange(2 * count, dtype=np.int32)
         said = self._scale * qpos[:, self._own_qpos] + self._offset
         rate_said = self._scale * qvel[:, self._own_dofs]
         self._q[np.ix_(ids, self._qpos)] = np.concatenate([said, qpos @ self._turns])

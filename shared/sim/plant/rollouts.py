@@ -15,8 +15,9 @@ from shared.sim.plant.controllers import Controllers
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.laws import Active, Rubbing, frictions_of, torques_of
 from shared.sim.plant.plant import TOOL, Plant
-from shared.sim.plant.row import JointsReport, Row, Step, TrackerReport
+from shared.sim.plant.row import JointsReport, Row, TrackerReport
 from shared.sim.plant.signals import Signal, filtered, sampled, sampled_poses
+from shared.sim.plant.step import Moment, Step, rows_of
 from shared.sim.plant.structure import Structure, compiled
 
 _CHUNK = 250
@@ -97,6 +98,7 @@ class Rollouts:
         self._joints = [self.model.joint(name) for name in plant.joints]
         self._qpos = np.array([int(joint.qposadr[0]) for joint in self._joints])
         self._dofs = np.array([int(joint.dofadr[0]) for joint in self._joints])
+        self._logged, self._moved = rows_of(self._qpos), rows_of(self._dofs)
         self._columns = np.concatenate(
             [_controls(self.model, int(self.model.actuator(name).id)) for name in plant.actuators]
         )
@@ -147,7 +149,7 @@ class Rollouts:
         if self._controllers is not None:
             self._controllers.begin(rows)
         self._restore(rows)
-        ids = np.arange(len(rows))
+        ids = np.arange(len(rows), dtype=np.int32)
         self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
         qpos, qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
         for row in rows:
@@ -266,7 +268,7 @@ class Rollouts:
         found = self._batch.rollout(
             ctrl.shape[1], control=ctrl, record=("qpos", "sensordata"), ids=ids
         )
-        return found["qpos"][:, :, self._qpos], found["sensordata"][:, :, self._tool]
+        return found["qpos"][:, :, self._logged], found["sensordata"][:, :, self._tool]
 
     def _closed(
         self,
@@ -276,62 +278,62 @@ class Rollouts:
         frictions: list[Rubbing],
         begin: int,
     ) -> tuple[Float64, Float64]:
-        batch = self._batch
+        batch, arms = self._batch, slice(0, len(ids))
         qpos, qvel, control = batch.bind("qpos"), batch.bind("qvel"), batch.bind("ctrl")
         applied, drives = batch.bind("qfrc_applied"), batch.bind("qfrc_actuator")
         bias, sensors = batch.bind("qfrc_bias"), batch.bind("sensordata")
+        logged, moved = self._logged, self._moved
         count = ctrl.shape[1]
         q = np.empty((len(ids), count, len(self._qpos)))
         tool = np.empty((len(ids), count, 7))
-        rubs = self._expanded["dof_frictionloss"] if frictions else np.empty(0)
-        joints = np.ix_(ids, self._dofs)
-        constant = rubs[joints] if frictions else rubs
+        rubs = self._expanded["dof_frictionloss"] if frictions else np.empty((0, 0))
+        rubbed = np.array(rubs[arms, moved]) if frictions else rubs
         beside = self._controllers
         if beside is not None and not len(beside.rows):
             beside = None
         if begin == 0:  # what the drives do and hold before the first step
-            control[ids] = ctrl[:, 0]
+            control[arms] = ctrl[:, 0]
             batch.forward(ids)
-            self._drive_before = np.array(drives)
-            self._speed_before = qvel[joints]
+            self._drive_before = np.array(drives[arms, moved])
+            self._speed_before = np.array(qvel[arms, moved])
         for index in range(count):
-            control[ids] = ctrl[:, index]
-            applied[ids] = 0.0
-            if frictions:
-                rubs[joints] = constant
-            drive = np.array(drives)
-            change = drive - self._drive_before
-            self._drive_before[:] = drive
-            speed = qvel[joints]
-            turning = self._rotors * (speed - self._speed_before) / self.plant.timestep
-            self._speed_before = speed
+            control[arms] = ctrl[:, index]
+            applied[arms] = 0.0
+            added = np.zeros_like(self._drive_before)
+            drive, speed = np.array(drives[arms, moved]), np.array(qvel[arms, moved])
+            change, self._drive_before = drive - self._drive_before, drive
             if beside is not None:
                 its = beside.rows
                 told = control[np.ix_(its, self._columns)]
                 beyond = beside.beyond_servos(told, qpos[its], qvel[its])
-                applied[np.ix_(its, self._dofs)] = beyond
-                drive[np.ix_(its, self._dofs)] += beyond
-            for active in (*laws, *frictions):
-                pick = np.ix_(active.rows, self._dofs)
-                step = Step(
-                    time=(begin + index) * self.plant.timestep,
-                    timestep=self.plant.timestep,
-                    q=qpos[np.ix_(active.rows, self._qpos)],
-                    qd=qvel[pick],
-                    drive=drive[pick],
-                    drive_change=change[pick],
-                    gravity=bias[pick],
-                    load=drive[pick] - turning[active.rows],
-                )
-                if isinstance(active, Rubbing):
-                    rubs[pick] += active.law(step, active.values)
-                else:
-                    applied[pick] += active.law(step, active.values, active.memory)
+                added[its] = beyond
+                drive = drive.copy()
+                drive[its] += beyond
+            moment = Moment(
+                time=(begin + index) * self.plant.timestep,
+                timestep=self.plant.timestep,
+                q=qpos[arms, logged],
+                qd=speed,
+                qd_before=self._speed_before,
+                drive=drive,
+                drive_change=change,
+                gravity=bias[arms, moved],
+                rotors=self._rotors,
+            )
+            if frictions:
+                total = rubbed.copy()
+                for each in frictions:
+                    total[each.rows] += each.law(Step(moment, each.rows), each.values)
+                rubs[arms, moved] = total
+            for each in laws:
+                added[each.rows] += each.law(Step(moment, each.rows), each.values, each.memory)
+            applied[arms, moved] = added
+            self._speed_before = speed
             batch.step(ids)
-            q[:, index] = qpos[np.ix_(ids, self._qpos)]
-            tool[:, index] = sensors[ids][:, self._tool]
+            q[:, index] = qpos[arms, logged]
+            tool[:, index] = sensors[arms, self._tool]
         if frictions:
-            rubs[joints] = constant
+            rubs[arms, moved] = rubbed
         return q, tool
 
     def _reports(self, row: Row, recorded: Recorded, motion: "_Motion") -> Reports:

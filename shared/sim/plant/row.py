@@ -11,30 +11,8 @@ import numpy as np
 from shared.sim.arm import Float64
 from shared.sim.plant.plant import Plant
 from shared.sim.plant.signals import Signal
+from shared.sim.plant.step import Step
 from shared.sim.plant.structure import STIFF, armature_for
-
-
-@dataclass
-class Step:
-    """What a torque law may look at, K arms at once; views, not to be kept."""
-
-    time: float
-    """(s)."""
-    timestep: float
-    """(s)."""
-    q: Float64
-    """float64[K, J], logged joints as they are (rad, m)."""
-    qd: Float64
-    """float64[K, J] (rad/s, m/s)."""
-    drive: Float64
-    """float64[K, J], what the actuators put on the joints (N m, N), of the last step."""
-    drive_change: Float64
-    """float64[K, J], by how much that rose from the step before (N m, N)."""
-    gravity: Float64
-    """float64[K, J], gravity, centrifugal and Coriolis torque that the drive has to hold."""
-    load: Float64
-    """float64[K, J], what gears transmit: ``drive`` less what turned the rotors (armature) in the
-    last step (N m, N)."""
 
 
 class TorqueLaw(Protocol):

@@ -14,7 +14,8 @@ from shared.identification.effect import Candidate, Effect
 from shared.identification.leftover import leftovers
 from shared.identification.problem import Problem, Variant
 from shared.identification.verdict import Unexplained
-from shared.sim.plant.row import Row, Step, TrackerReport
+from shared.sim.plant.row import Row, TrackerReport
+from shared.sim.plant.step import Step
 from tests.arms import JOINTS
 from tests.measured import Enter, measure, nominal, problem_of
 
