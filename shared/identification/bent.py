@@ -16,13 +16,13 @@ from shared.identification.base import INERTIA_PRIOR, BaseParameter, base_parame
 from shared.identification.causes import motion, rival
 from shared.identification.certainty import half_widths, is_there
 from shared.identification.dataset.types import Float64
-from shared.identification.fit import WINDOW, Fit, polish
+from shared.identification.fit import WINDOW, Fit, go_down, polish
 from shared.identification.gate import compare, stretches
 from shared.identification.places import moving
 from shared.identification.problem import Problem
 from shared.identification.progress import Progress
 from shared.identification.screen import Screened, screen
-from shared.identification.searched import NEARLY_NOISE, Otherwise, Search, Tried
+from shared.identification.searched import ALIKE, NEARLY_NOISE, Otherwise, Search, Tried
 from shared.identification.sentence import label
 from shared.identification.space import Space
 from shared.identification.verdict import Cause, Interval, Tie
@@ -33,6 +33,8 @@ FAR = 0.5
 that a model file gives, as a share of it."""
 NEARBY = 0.2
 """Standard deviation of the same, in a model file that is about right."""
+_NEARER = 1.0
+"""Of the same as ``FAR``, that a search for a base near the file begins with at most."""
 _POSTURE = 0.2
 """Travel that changes the lever of a weight by a fifth at most (rad)."""
 _TRIED = 4
@@ -65,8 +67,8 @@ def otherwise(found: Search, progress: Progress) -> Otherwise | None:
     progress("base fit", 0.0, "again, near the model file")
     problem = replace(found.problem, parameters=_known(found.problem))
     train, test = problem.of("train"), problem.of("test")
-    base = _along(Space(problem), _placed(found.base, problem))
-    if not _surely_far(base) and not (_stays(problem) and _against(base) > _SLIGHT):
+    base = _still_far(found.base, Space(problem))
+    if base is None:
         return None
     tried: list[Tried] = []
     instead = _instead(found, base.space)
@@ -83,6 +85,50 @@ def otherwise(found: Search, progress: Progress) -> Otherwise | None:
         return None
     tried.sort(key=lambda each: each.gain.loss)
     return Otherwise(base, tuple(tried), _alike(base, tried))
+
+
+def _still_far(base: Fit, space: Space) -> Fit | None:
+    """Return a base's fit once the model file is believed more, or None if it is not far then.
+
+    On its way it only comes nearer to the file, so as soon as it is not far it never will be.
+
+    Args:
+        base: its fit so far.
+        space: of the same parameters, or more, as the file is believed now.
+    """
+    train = space.problem.of("train")
+    fit = _begun(_placed(base, space), train)
+    for _ in range(_STEPS):
+        found = go_down(fit, train)
+        if not _is_far(found):
+            return None
+        if not found.cost < fit.cost * (1 - _ENOUGH):
+            break
+        fit = Fit.at(space, found.z, train)
+    return fit if _is_far(fit) else None
+
+
+def _begun(placed: Fit, train: tuple[int, ...]) -> Fit:
+    """Return where to begin: the base, or what is furthest off of it a good deal nearer.
+
+    A rotor with a tenth of its inertia is felt no more than one with a twentieth, and the way back
+    from there is long.
+    """
+    space = placed.space
+    most = np.array(
+        [_NEARER * _unit(each) if _is_file(each) else np.inf for each in space.problem.parameters]
+    )
+    z = np.clip(placed.z, -most, most)
+    if np.array_equal(z, placed.z):
+        return placed
+    nearer = go_down(Fit.at(space, z, train), train)
+    return Fit.at(space, nearer.z, train) if nearer.cost < placed.cost else placed
+
+
+def _is_far(base: Fit) -> bool:
+    """Return whether a base is far from the model file, by one number surely or by all of them."""
+    is_off = _stays(base.space.problem) and _against(base) > _SLIGHT
+    return is_off or bool(_surely_far(base))
 
 
 def _along(space: Space, begun: Float64) -> Fit:
@@ -117,9 +163,12 @@ def _brings_back(base: Fit, fit: Fit) -> bool:
 
 
 def _is_worse(losses: Float64, than: Float64) -> bool:
-    """Return whether the held-out recordings prefer the other one by more than chance would."""
+    """Return whether the held-out recordings prefer the other one, by more than chance and a bit.
+
+    Where both leave hardly more than noise, one of six that do as well is off by chance alone.
+    """
     margin = compare(losses, than, np.random.default_rng(0))
-    return margin.gain > margin.error
+    return margin.gain > max(margin.error, ALIKE * margin.loss)
 
 
 def _alike(base: Fit, tried: Sequence[Tried]) -> float:
@@ -150,8 +199,13 @@ def _far(fit: Fit) -> tuple[int, ...]:
     return tuple(
         index
         for index, (each, z) in enumerate(zip(fit.space.problem.parameters, fit.z, strict=False))
-        if each.nominal and each.prior != INERTIA_PRIOR and abs(z) > FAR * _unit(each)
+        if _is_file(each) and abs(z) > FAR * _unit(each)
     )
+
+
+def _is_file(each: BaseParameter) -> bool:
+    """Return whether the model file says how large a number is, and may be far off."""
+    return bool(each.nominal) and each.prior != INERTIA_PRIOR
 
 
 def _unit(each: BaseParameter) -> float:
@@ -165,18 +219,22 @@ def _known(problem: Problem) -> tuple[BaseParameter, ...]:
     A friction of which it says nothing may be any; links are as well known as ever.
     """
     return tuple(
-        replace(each, prior=NEARBY * _unit(each))
-        if each.nominal and each.prior != INERTIA_PRIOR
-        else each
+        replace(each, prior=NEARBY * _unit(each)) if _is_file(each) else each
         for each in base_parameters(problem.subject)
     )
 
 
-def _placed(fit: Fit, problem: Problem) -> Float64:
-    """Return a base's coordinates in another problem of the same parameters, or more."""
+def _placed(fit: Fit, space: Space) -> Fit:
+    """Return a base's fit, as it is, in another space of the same parameters, or more."""
     names = [each.name for each in fit.space.problem.parameters]
+    parameters, train = space.problem.parameters, space.problem.of("train")
     known = dict(zip(names, fit.z, strict=True))
-    return np.array([known.get(each.name, 0.0) for each in problem.parameters], np.float64)
+    z = np.array([known.get(each.name, 0.0) for each in parameters], np.float64)
+    if [each.name for each in parameters] != names:
+        return Fit.at(space, z, train)
+    rows = len(fit.residual) - space.size
+    residual = np.r_[fit.residual[:rows], z / space.priors]
+    return Fit.of(space, z, residual, np.r_[fit.jacobian[:rows], np.diag(1.0 / space.priors)])
 
 
 def _surely_far(fit: Fit) -> list[int]:
