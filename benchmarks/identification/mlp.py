@@ -44,7 +44,7 @@ def mlp(found: Search, rng: np.random.Generator) -> dict[str, Any]:
 def _table(found: Search, segments: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Return float64[B, F] of what the model does, and float64[B, C] of what it leaves over."""
     problem, base = found.problem, found.base
-    variant = base.space.variant(base.z)
+    variant = base.variant
     reports = problem.reports([variant], segments)[0]
     features, wanted = [], []
     for index, report in zip(segments, reports, strict=True):

@@ -7,6 +7,7 @@ import numpy as np
 
 from shared.identification.gate import FEWEST, stretches
 from shared.identification.pushes import not_counted
+from shared.identification.screen import Seen
 from shared.identification.searched import Search
 from shared.identification.verdict import Unexplained
 
@@ -14,7 +15,13 @@ from shared.identification.verdict import Unexplained
 def fresh(found: Search, seed: int) -> Search:
     """Return a search that has just begun once more, for one more try with other losses."""
     return replace(
-        found, rng=np.random.default_rng([seed, 2]), screened={}, tried={}, accepted=[], rivals=[]
+        found,
+        rng=np.random.default_rng([seed, 2]),
+        seen=Seen(),
+        screened={},
+        tried={},
+        accepted=[],
+        rivals=[],
     )
 
 
@@ -32,7 +39,7 @@ def leave_out(found: Search, left: Sequence[Unexplained]) -> bool:
         if spans:
             problem.uncounted[segment] = not_counted(problem, segment, spans)
     test = problem.of("test")
-    losses = stretches(problem, found.base.space.variant(found.base.z), test)
+    losses = stretches(problem, found.base.variant, test)
     if len(losses) < FEWEST:
         problem.uncounted.clear()
     if not problem.uncounted:

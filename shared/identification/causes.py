@@ -19,7 +19,7 @@ def causes_of(found: Search, widths: Float64) -> tuple[Cause, ...]:
     begin = final.space.base_size
     base = float(found.base_losses.mean())
     sizes: dict[Candidate, tuple[Float64, Float64]] = {}
-    for candidate, values in final.space.variant(final.z).extras:
+    for candidate, values in final.variant.extras:
         count = len(values)
         sizes[candidate] = (values, widths[begin : begin + count])
         begin += count

@@ -86,7 +86,7 @@ def _widths(found: Search) -> Float64:
 
 def extended(found: Search) -> Variant:
     """Return the model with what was accepted."""
-    return found.current.space.variant(found.current.z)
+    return found.current.variant
 
 
 def _word(found: Search, ties: tuple[Tie, ...], left: tuple[Unexplained, ...]) -> Word:
@@ -114,7 +114,7 @@ def _held_out(found: Search) -> HeldOut:
     nothing = Variant(np.zeros(len(problem.parameters)))
     stages = {
         "nominal": nothing,
-        "base_fit": found.base.space.variant(found.base.z),
+        "base_fit": found.base.variant,
         "extended": extended(found),
     }
     test = problem.of("test")

@@ -77,7 +77,7 @@ def one_for_many(found: Search, train: tuple[int, ...], test: tuple[int, ...]) -
             if not is_fewer or other.is_event or not other.gain.is_sure:
                 continue
             fit = _instead(found, {one.candidate for one in many}, other, train)
-            losses = stretches(found.problem, fit.space.variant(fit.z), test)
+            losses = stretches(found.problem, fit.variant, test)
             margin = compare(losses, found.current_losses, found.rng)
             whole = compare(found.base_losses, losses, found.rng)
             is_alike = margin.gain < max(margin.error, ALIKE * whole.gain)

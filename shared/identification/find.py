@@ -104,7 +104,7 @@ def _left(found: Search, known: Sequence[Unexplained] = ()) -> tuple[Unexplained
 
 def _evidence(found: Search) -> Evidence:
     nominal = Variant(np.zeros(len(found.problem.parameters)))
-    base = found.base.space.variant(found.base.z)
+    base = found.base.variant
     return evidence_of(
         found.problem, {"nominal": nominal, "base_fit": base, "extended": extended(found)}
     )

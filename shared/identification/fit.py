@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from shared.identification.cmaes import minimize
 from shared.identification.dataset.types import Float64
 from shared.identification.noise import Noise
+from shared.identification.problem import Variant
 from shared.identification.space import Space
 
 _MAX_STEPS = 12
@@ -45,6 +46,11 @@ class Fit:
     cost: float
     """Half the sum of squares."""
     starts_agree: bool = True
+
+    @property
+    def variant(self) -> Variant:
+        """Return the model that it is."""
+        return self.space.variant(self.z)
 
     @functools.cached_property
     def spread(self) -> Float64:

@@ -18,7 +18,7 @@ from shared.identification.base import loose_parameters
 from shared.identification.dataset.types import Float64
 from shared.identification.fit import Fit
 from shared.identification.gate import STRETCH
-from shared.identification.problem import BLOCK, Problem
+from shared.identification.problem import BLOCK, Problem, Variant
 from shared.identification.space import Space
 
 _SURE = 2.6
@@ -65,16 +65,15 @@ class Held:
         basis, sizes, _ = np.linalg.svd(jacobian, full_matrices=False)
         self._basis = np.asarray(basis[:, sizes > _RANK * sizes[0]], np.float64)
 
-    def follow(self, before: Fit, after: Fit) -> Foretold:
+    def follow(self, before: Variant, after: Variant) -> Foretold:
         """Return how residuals without a cause follow what it foretells.
 
         Args:
             before: without it.
             after: with it.
         """
-        problem = after.space.problem
-        variants = [each.space.variant(each.z) for each in (before, after)]
-        found = problem.vector(variants, self._test)[:, self._counts]
+        problem = self.fit.space.problem
+        found = problem.vector([before, after], self._test)[:, self._counts]
         found = found - (found @ self._basis) @ self._basis.T
         way: Float64 = found[0] - found[1]
         left: Float64 = found[1]

@@ -5,7 +5,7 @@ forearm whose torque is limited to a quarter was fitted with ten times its inert
 then missing looked like a friction. Seen from the nominal model it comes first.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from shared.identification.effect import Candidate
 from shared.identification.fit import Fit, Start
 from shared.identification.progress import Progress
 from shared.identification.refit import Rough, refit, refit_late
-from shared.identification.screen import Screened, screen
+from shared.identification.screen import Screened, Seen, screen
 from shared.identification.turns import LATE
 
 _TRIED = 6
@@ -34,7 +34,8 @@ _ONCE_BESIDE = 0.3
 
 def look(
     fit: Fit, nominal: Start, candidates: Sequence[Candidate], is_far: bool, progress: Progress,
-    is_calm: bool = False,
+    is_calm: bool = False, is_hopeless: Callable[[Screened], bool] = lambda one: False,
+    seen: Seen | None = None,
 ) -> tuple[list[Screened], list[Rough]]:  # fmt: skip
     """Return what every candidate could explain, best first, and rough refits of the best.
 
@@ -45,14 +46,18 @@ def look(
         is_far: whether so much is left that the base may be bent.
         progress: is told how far it is.
         is_calm: whether nothing stands out that may have happened once; no such candidate is
-            refitted then.
+            refitted then, nor looked at beside a cause.
+        is_hopeless: says of a candidate that it has no prospect of passing: it is not refitted.
+        seen: how candidates changed the residual when they were first looked at.
     """
     segments = fit.space.problem.of("train")
+    if is_calm and fit.space.candidates:
+        candidates = [each for each in candidates if each.recording is None]
     progress("screen", 0.0, f"{len(candidates)} candidates")
-    screened = screen(fit, candidates, segments)
+    screened = screen(fit, candidates, segments, seen)
     slight = _slight(fit)
     refitted = [each for each in screened if not is_calm or each.candidate.recording is None]
-    picked = [(each, fit) for each in _diverse(refitted, slight)]
+    picked = [(each, fit) for each in _diverse(refitted, slight) if not is_hopeless(each)]
     if is_far:
         progress("screen", 0.5, "again, from the nominal model")
         far = Fit.at(fit.space, np.r_[nominal.z, fit.z[nominal.z.size :]], segments)

@@ -5,22 +5,21 @@ out, so that a latency that damping imitates does not count twice, and candidate
 imitates altogether do not count at all.
 """
 
-import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shared.identification.dataset.types import Float64
-from shared.identification.effect import Candidate, Effect, Quantity
+from shared.identification.effect import Candidate, Effect
 from shared.identification.fit import Fit
 from shared.identification.linear import bounded, least_squares
-from shared.identification.problem import Variant
+from shared.identification.looks import Columns, Looked, columns_of, looks_of
 from shared.identification.subject import Subject
+from shared.identification.turns import LATE
 
-GRID = (0.25, 0.5, 1.0, 2.0, 4.0)
-"""Sizes, in probes, at which an effect that is not smooth is looked at."""
 _EVERY = 2
 """One in so many parts shows what acts all the time well enough to be looked at closer, or not."""
 _MANY = 8
@@ -31,6 +30,10 @@ _PLAIN = 10.0
 """Mean square residual, in noise floors, from which it is: what is small takes all parts."""
 _NEAR = 2.0
 """An effect that acts from some size on is looked at where it does no more than twice too much."""
+CALM = 1.5
+"""Mean square residual, in noise floors, up to which hardly more than noise is left."""
+_AGAIN, _AGAIN_LOCAL = 40, 2
+"""Candidates that are looked at again then: of those that act at any size, and of the others."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,23 @@ class Screened:
     the same ones for all candidates; empty if nothing."""
 
 
+@dataclass
+class Seen:
+    """How candidates changed the residual when they were first looked at."""
+
+    steady: Columns = field(default_factory=dict[Candidate, list[Looked]])
+    """Of those that act at any size, in the parts in which they were looked at."""
+    local: Columns = field(default_factory=dict[Candidate, list[Looked]])
+    """Of the others, in all parts."""
+
+
+class _Judged(NamedTuple):
+    """A candidate at its best, and the look that showed it."""
+
+    screened: Screened
+    looked: Looked
+
+
 def candidates_of(
     effects: Sequence[Effect], subject: Subject, without: frozenset[str]
 ) -> tuple[tuple[Candidate, ...], dict[str, str]]:
@@ -67,7 +87,9 @@ def candidates_of(
     return tuple(found), ruled_out
 
 
-def screen(fit: Fit, candidates: Sequence[Candidate], segments: tuple[int, ...]) -> list[Screened]:
+def screen(
+    fit: Fit, candidates: Sequence[Candidate], segments: tuple[int, ...], seen: Seen | None = None
+) -> list[Screened]:
     """Return every candidate that explains anything, best first.
 
     Args:
@@ -75,24 +97,88 @@ def screen(fit: Fit, candidates: Sequence[Candidate], segments: tuple[int, ...])
         candidates: what is looked for.
         segments: recordings, or parts of them. Of many, every second one has to do for what acts
             all the time, but for the best of that unless much is left.
+        seen: is filled at the first look. At a later one, where hardly more than noise is left,
+            candidates that by it would explain least are not looked at, nor returned.
     """
     picked = segments[::_EVERY] if len(segments) >= _MANY else segments
     rows = fit.space.problem.rows_of(segments, picked)
     subject = fit.space.problem.subject
-    once = [each for each in candidates if each.recording is not None]
     lasting = [each for each in candidates if each.recording is None]
     steady = [each for each in lasting if _is_steady(subject, each)]
     local = [each for each in lasting if not _is_steady(subject, each)]
-    found = sorted(_screened(fit.on(rows), steady, picked, None), key=_best_first)
+    part = fit.on(rows)
+    if seen is not None and is_calm(fit):
+        steady = _once_more(part, steady, seen.steady, _AGAIN)
+        local = _once_more(fit, local, seen.local, _AGAIN_LOCAL)
+    columns = columns_of(part, looks_of(subject, steady), picked)
+    everywhere = columns_of(fit, looks_of(subject, local), segments)
+    if seen is not None and not seen.steady:
+        seen.steady, seen.local = columns, everywhere
+    judged = sorted(_judged(part, columns), key=lambda each: -each.screened.share)
     is_plain = 2.0 * fit.cost > _PLAIN * len(fit.residual)
-    if len(picked) < len(segments) and not is_plain:
-        local += [each.candidate for each in found[:_CLOSER]]
-        del found[:_CLOSER]
-    found += _screened(fit, local, segments, rows)
+    count = _CLOSER if len(picked) < len(segments) and not is_plain else 0
+    found = [each.screened for each in judged[count:]]
+    found += _closer(fit, judged[:count], segments, picked)
+    found += [each.screened for each in _judged(fit, everywhere, rows)]
+    once = [each for each in candidates if each.recording is not None]
     for recording in dict.fromkeys(each.recording for each in once):
         own = [each for each in once if each.recording == recording]
-        found += _screened(fit, own, segments, rows, _of_recording(fit, recording, segments))
-    return sorted(found, key=_best_first)
+        acted = _of_recording(fit, recording, segments)
+        columns = columns_of(fit, looks_of(subject, own), segments, acted)
+        found += [each.screened for each in _judged(fit, columns, rows)]
+    return sorted(found, key=lambda each: -each.share)
+
+
+def is_calm(fit: Fit) -> bool:
+    """Return whether hardly more than noise is left of what was fitted to."""
+    is_measured = fit.space.problem.noise.is_measured
+    return is_measured and 2.0 * fit.cost < CALM * len(fit.residual)
+
+
+def _once_more(
+    fit: Fit, candidates: Sequence[Candidate], columns: Columns, count: int
+) -> list[Candidate]:
+    """Return those that are worth another look; what they change is much as it was.
+
+    Of commands that are taken now and then it is not: as soon as a delay is there they change.
+
+    Args:
+        fit: what is there so far.
+        candidates: which were looked at before.
+        columns: how they changed the residual then.
+        count: of those to look at again.
+    """
+    known = {each: columns[each] for each in candidates if each in columns}
+    best = sorted(_judged(fit, known), key=lambda each: -each.screened.share)[:count]
+    kept = {each.screened.candidate for each in best}
+    return [
+        each for each in candidates if each in kept or each not in known or each.effect.name in LATE
+    ]
+
+
+def _closer(
+    fit: Fit, judged: Sequence[_Judged], segments: tuple[int, ...], picked: tuple[int, ...]
+) -> list[Screened]:
+    """Return candidates as all parts show them, at the look that showed them in some.
+
+    Args:
+        fit: on all of them.
+        judged: the candidates.
+        segments: all of them.
+        picked: those in which they were looked at.
+    """
+    rows = fit.space.problem.rows_of(segments, picked)
+    others = tuple(each for each in segments if each not in picked)
+    looks = {each.screened.candidate: (each.looked.look,) for each in judged}
+    more = columns_of(fit.on(~rows), looks, others)
+    both: dict[Candidate, list[Looked]] = {}
+    for each in judged:
+        here = each.looked
+        (there,) = more[each.screened.candidate]
+        columns = np.empty((len(here.columns), len(rows)))
+        columns[:, rows], columns[:, ~rows] = here.columns, there.columns
+        both[each.screened.candidate] = [Looked(here.look, columns)]
+    return [each.screened for each in _judged(fit, both, rows)]
 
 
 def _of_recording(fit: Fit, name: str | None, segments: tuple[int, ...]) -> tuple[int, ...]:
@@ -102,117 +188,39 @@ def _of_recording(fit: Fit, name: str | None, segments: tuple[int, ...]) -> tupl
     return tuple(each for each in segments if names[problem.segments[each].trajectory] == name)
 
 
-def _best_first(screened: Screened) -> float:
-    return -screened.share
-
-
 def _is_steady(subject: Subject, candidate: Candidate) -> bool:
     """Return whether a candidate acts at any size."""
     found = candidate.effect.quantities(subject, candidate.place)
     return all(each.is_smooth for each in found)
 
 
-def _screened(
-    fit: Fit, candidates: Sequence[Candidate], segments: tuple[int, ...],
-    rows: NDArray[np.bool_] | None, acted: tuple[int, ...] | None = None,
-) -> list[Screened]:  # fmt: skip
+def _judged(fit: Fit, columns: Columns, rows: NDArray[np.bool_] | None = None) -> list[_Judged]:
     """Return every candidate at its best.
 
     Args:
-        fit: what is there so far, on the segments.
-        candidates: what is looked for.
-        segments: of the fit.
+        fit: what is there so far.
+        columns: how candidates change its residual.
         rows: of which signatures are; all if None.
-        acted: segments in which the candidates can change anything; all if None.
     """
-    if not candidates:
-        return []
-    problem, base = fit.space.problem, fit.space.variant(fit.z)
     basis, triangle = np.linalg.qr(fit.jacobian)
     left = fit.residual - basis @ (basis.T @ fit.residual)
-    variants: list[Variant] = []
-    looks: list[list[tuple[_Look, slice]]] = []
-    for candidate in candidates:
-        quantities = candidate.effect.quantities(problem.subject, candidate.place)
-        begun: list[tuple[_Look, slice]] = []
-        for look in _looks(quantities):
-            begin = len(variants)
-            variants += [base.with_extra(candidate, values) for values in look.values]
-            begun.append((look, slice(begin, len(variants))))
-        looks.append(begun)
-    found = _signatures(fit, variants, segments, segments if acted is None else acted)
     shown = slice(None) if rows is None else np.r_[rows, np.ones(fit.space.size, np.bool_)]
-    out: list[Screened] = []
-    for candidate, begun in zip(candidates, looks, strict=True):
+    out: list[_Judged] = []
+    for candidate, looked in columns.items():
         tried = [
-            _judge(candidate, found[of].T, look, basis, triangle, left, fit, shown)
-            for look, of in begun
+            _Judged(_judge(candidate, each, basis, triangle, left, fit, shown), each)
+            for each in looked
         ]
-        out.append(max(tried, key=lambda each: each.share))
+        out.append(max(tried, key=lambda each: each.screened.share))
     return out
-
-
-@dataclass(frozen=True)
-class _Look:
-    """Sizes that are simulated one at a time and then mixed."""
-
-    scale: float
-    """Of the probes."""
-    form: Float64
-    """float64[Q], what is the same for all of them, in probes."""
-    sizes: tuple[int, ...]
-    """The quantities that say how much."""
-    values: tuple[Float64, ...]
-    """float64[Q] for each of them."""
-    is_level: bool = False
-    """Whether it acts from some size on: what is twice as large is no mixture of it."""
-
-
-def _looks(quantities: Sequence[Quantity]) -> list[_Look]:
-    """Return all combinations of forms, each at all scales."""
-    probes = np.array([each.probe for each in quantities])
-    low, high = (np.array([getattr(each, end) for each in quantities]) for end in ("low", "high"))
-    sizes = tuple(index for index, each in enumerate(quantities) if not each.grid)
-    forms = [index for index, each in enumerate(quantities) if each.grid]
-    is_smooth = all(quantities[index].is_smooth for index in sizes)
-    scales = GRID
-    if is_smooth:
-        scales = tuple(sorted({scale for index in sizes for scale in quantities[index].scales}))
-    is_level = not sizes
-    if is_level:  # a number that acts from some size on, which its grid is about
-        sizes, forms = (0,), forms[1:]
-        scales = tuple(value / quantities[0].probe for value in quantities[0].grid)
-    out: list[_Look] = []
-    for grid in itertools.product(*(quantities[index].grid for index in forms)):
-        form = np.zeros(len(quantities))
-        form[forms] = np.array(grid) / probes[forms]
-        for scale in scales:
-            values: list[Float64] = []
-            for index in sizes:
-                each = form.copy()
-                each[index if is_smooth else list(sizes)] = 1.0
-                each[index] = scale
-                values.append(np.clip(each * probes, low, high))
-            out.append(_Look(scale, form, sizes, tuple(values), is_level))
-    return out
-
-
-def _signatures(
-    fit: Fit, variants: Sequence[Variant], segments: tuple[int, ...], acted: tuple[int, ...]
-) -> Float64:
-    """Return float64[V, M + n]: how the residual changes."""
-    problem = fit.space.problem
-    moved = np.zeros((len(variants), len(fit.residual)))
-    if acted:
-        rows = np.flatnonzero(problem.rows_of(segments, acted))
-        moved[:, rows] = problem.vector(variants, acted) - fit.residual[rows]
-    return moved
 
 
 def _judge(
-    candidate: Candidate, columns: Float64, look: _Look, basis: Float64, triangle: Float64,
+    candidate: Candidate, looked: Looked, basis: Float64, triangle: Float64,
     left: Float64, fit: Fit, shown: slice | NDArray[np.bool_],
 ) -> Screened:  # fmt: skip
+    look = looked.look
+    columns = np.pad(looked.columns, ((0, 0), (0, fit.space.size))).T
     bare = columns - basis @ (basis.T @ columns)
     size = np.linalg.norm(bare, axis=0)
     if not np.isfinite(size).all() or float(size.max(initial=0.0)) < 1e-6:

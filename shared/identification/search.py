@@ -16,6 +16,7 @@ from shared.identification.gate import (
     stretches,
 )
 from shared.identification.look import look
+from shared.identification.outlook import hopeless
 from shared.identification.progress import Progress
 from shared.identification.refit import settle
 from shared.identification.searched import (
@@ -100,10 +101,12 @@ def _round(
         return False
     is_measured = found.problem.noise.is_measured
     is_far = not is_measured or float(found.current_losses.mean()) > _FAR_OFF
-    now = found.current.space.variant(found.current.z)
+    now = found.current.variant
     before = plain_stretches(found.problem, now, train)
     is_calm = float(before.max()) <= _usually(before)
-    screened, roughly = look(found.parts, found.nominal, left, is_far, progress, is_calm)
+    screened, roughly = look(
+        found.parts, found.nominal, left, is_far, progress, is_calm, hopeless(found), found.seen
+    )
     for each in screened:
         found.screened.setdefault(each.candidate.label, each)
     tried: list[Tried] = []
@@ -126,7 +129,7 @@ def _round(
     best, rivals = _simplest(_sure(useful, train), found.rng)
     rivals = tuple(one for one in rivals if _is_rival(found, best, one, train, test))
     fit = polish(best.fit.space, best.fit.z, train, 4, enough=1e-4)
-    losses = stretches(found.problem, fit.space.variant(fit.z), test)
+    losses = stretches(found.problem, fit.variant, test)
     gain, fitted = judged(found, best.candidate, so_far(found), Model(fit, losses))
     if gain.loss <= best.gain.loss and (best.is_event or gain.is_useful(base)):
         best = Tried(best.screened, fit, gain, losses, best.is_event, fitted=fitted)
@@ -207,7 +210,7 @@ def _explains_event(
     """
     if candidate.recording is None:
         return False
-    after = plain_stretches(fit.space.problem, fit.space.variant(fit.z), train)
+    after = plain_stretches(fit.space.problem, fit.variant, train)
     worst = int(np.argmax(before - after))
     most = _usually(before)
     return bool(

@@ -13,7 +13,7 @@ from shared.identification.foretold import Held
 from shared.identification.gate import Gain, compare, plain_stretches
 from shared.identification.left_out import left_out
 from shared.identification.problem import Problem, Variant
-from shared.identification.screen import Screened
+from shared.identification.screen import Screened, Seen
 
 ALIKE = 0.02
 """Of a cause's gain: what does as well within this is not told from it."""
@@ -131,6 +131,8 @@ class Search:
     nominal_losses: Float64
     base_losses: Float64
     current_losses: Float64
+    seen: Seen = field(default_factory=Seen)
+    """How candidates changed the residual in the first round."""
     screened: dict[str, Screened] = field(default_factory=dict[str, Screened])
     """Every candidate's best, from the first round."""
     tried: dict[str, Tried] = field(default_factory=dict[str, Tried])
@@ -206,7 +208,7 @@ def plain_losses(found: Search) -> tuple[Float64, Float64, Float64]:
 
 def plain_losses_of(problem: Problem, model: "Model") -> Float64:
     """Return float64[S] of one model's, the same."""
-    return _plain(problem, model.fit.space.variant(model.fit.z), model.losses)
+    return _plain(problem, model.fit.variant, model.losses)
 
 
 def _plain(problem: Problem, variant: Variant, losses: Float64) -> Float64:
@@ -271,10 +273,15 @@ def _is_followed(found: Search, candidate: Candidate, before: Fit, after: Fit) -
     """Return whether what was held out follows a cause, however little it takes off."""
     if not _is_fitted(before, after):
         return False
+    is_sure = held_of(found, before).follow(before.variant, after.variant).is_sure
+    return is_sure and is_there(after, candidate, found.problem.of("train"))
+
+
+def held_of(found: Search, before: Fit) -> Held:
+    """Return held-out recordings without what a fit's base could make up for there."""
     if found.held is None or found.held.fit is not before:
         found.held = Held(before)
-    is_sure = found.held.follow(before, after).is_sure
-    return is_sure and is_there(after, candidate, found.problem.of("train"))
+    return found.held
 
 
 def _is_fitted(before: Fit, after: Fit) -> bool:

@@ -34,7 +34,7 @@ def step_error(fit: Fit) -> Float64:
 
 def changed_by(fit: Fit, timestep: float) -> Float64:
     """Return float64[J], by how much another time step (s) moves joints, in noise floors (RMS)."""
-    problem, variant = fit.space.problem, fit.space.variant(fit.z)
+    problem, variant = fit.space.problem, fit.variant
     test = problem.of("test")
     plant = finer(problem.subject.plant, timestep)
     subject = replace(problem.subject, plant=plant, nominal=Rollouts(plant, (), len(test)))

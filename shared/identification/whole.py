@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from shared.identification.dataset.types import Float64
 from shared.identification.fit import Fit, polish
 from shared.identification.gate import plain_stretches
 from shared.identification.searched import ByAll, Search, is_open
@@ -42,7 +43,7 @@ def fit_to_all(found: Search, left: Sequence[Unexplained]) -> None:
     if not more or not (found.accepted or is_asked):
         return
     segments = (*problem.of("train"), *more)
-    fit = polish(current.space, current.z, segments, _STEPS)
+    fit = polish(current.space, current.z, segments, _STEPS, known=_known(current, more))
     if found.accepted:
         found.final, found.fitted_to = fit, segments
     if is_asked:
@@ -50,9 +51,19 @@ def fit_to_all(found: Search, left: Sequence[Unexplained]) -> None:
         found.by_all = ByAll(max(one.new for one in both), max(one.plain for one in both))
 
 
+def _known(fit: Fit, more: tuple[int, ...]) -> tuple[Float64, Float64]:
+    """Return residual and derivative of a fit on more segments after those that it has."""
+    residual, jacobian = fit.space.jacobian(fit.z, more)
+    rows = len(fit.residual) - fit.space.size
+    return (
+        np.concatenate([fit.residual[:rows], residual]),
+        np.concatenate([fit.jacobian[:rows], jacobian]),
+    )
+
+
 def _left(fit: Fit, segments: tuple[int, ...], of: tuple[int, ...]) -> ByAll:
     """Return the mean square residuals of some of the segments of a fit."""
     problem = fit.space.problem
     rows = problem.rows_of(segments, of)
-    plain = plain_stretches(problem, fit.space.variant(fit.z), of)
+    plain = plain_stretches(problem, fit.variant, of)
     return ByAll(float(np.mean(fit.residual[: len(rows)][rows] ** 2)), float(plain.mean()))

@@ -35,7 +35,7 @@ def named_at_the_elbow(folder: Path, drags: dict[str, float]) -> Fit:
 def elsewhere(fit: Fit) -> Family | None:
     problem = fit.space.problem
     train, test = problem.of("train"), problem.of("test")
-    losses = stretches(problem, fit.space.variant(fit.z), test)
+    losses = stretches(problem, fit.variant, test)
     others = relatives(AT_JOINTS, Candidate(DRAG, "elbow"), fit)
     return look_elsewhere(fit, others, losses, train, test, np.random.default_rng(0))
 
@@ -45,10 +45,7 @@ def test_what_every_joint_has_is_found_at_the_others_at_once(tmp_path: Path):
     family = elsewhere(named_at_the_elbow(tmp_path, truth))
     assert family is not None
     assert [each.place for each in family.gains] == ["pan", "lift"]
-    found = {
-        candidate.place: float(values[0])
-        for candidate, values in family.fit.space.variant(family.fit.z).extras
-    }
+    found = {candidate.place: float(values[0]) for candidate, values in family.fit.variant.extras}
     assert found == pytest.approx(truth, rel=0.3)  # damping makes up for some
     assert family.losses.mean() < 1.25
     assert all(gain.surely > 0.0 for gain in family.gains.values())

@@ -37,7 +37,7 @@ class Looked:
         return polish(grown, np.r_[self.before.z, 0.5], self.problem.of("train"), 4)
 
     def follow(self, candidate: Candidate) -> Foretold:
-        return self.held.follow(self.before, self.after(candidate))
+        return self.held.follow(self.before.variant, self.after(candidate).variant)
 
 
 @pytest.fixture(scope="module")
@@ -47,11 +47,9 @@ def small() -> Looked:
 
 def test_what_is_held_out_follows_the_right_cause_where_its_loss_says_little(small: Looked):
     after, test = small.after(SHOULDER), small.problem.of("test")
-    losses = [
-        stretches(small.problem, fit.space.variant(fit.z), test) for fit in (small.before, after)
-    ]
+    losses = [stretches(small.problem, fit.variant, test) for fit in (small.before, after)]
     gain = compare(losses[0], losses[1], np.random.default_rng(0))
-    found = small.held.follow(small.before, after)
+    found = small.held.follow(small.before.variant, after.variant)
     assert found.is_sure
     assert found.share == pytest.approx(1.0, abs=0.5)
     assert found.errors > 1.3 * gain.gain / gain.error
@@ -67,14 +65,14 @@ def test_it_does_not_follow_another_cause_nor_one_that_is_not_there(small: Looke
 def test_what_the_base_could_make_up_for_is_no_evidence(small: Looked):
     """A base that is better fitted takes off some loss, and nothing in favour of a cause."""
     worse = replace(small.before, z=small.before.z + 0.01)
-    found = small.held.follow(worse, small.before)
+    found = small.held.follow(worse.variant, small.before.variant)
     assert abs(found.errors) < 0.3 * np.sqrt(len(small.before.z))
 
 
 def test_a_cause_that_changes_nothing_is_not_followed(small: Looked):
     grown = small.before.space.grown(Candidate(COULOMB, "elbow"))
     same = replace(small.before, space=grown, z=np.r_[small.before.z, 0.0])
-    assert small.held.follow(small.before, same) == Foretold(0.0, 0.0)
+    assert small.held.follow(small.before.variant, same.variant) == Foretold(0.0, 0.0)
 
 
 def test_stretches_that_do_not_count_have_no_say(small: Looked):
@@ -83,7 +81,7 @@ def test_stretches_that_do_not_count_have_no_say(small: Looked):
         small.problem.uncounted[segment] = np.ones(small.problem.shape_of(segment)[0], np.bool_)
         small.problem.uncounted[segment][:40] = False
     try:
-        found = Held(small.before).follow(small.before, small.after(SHOULDER))
+        found = Held(small.before).follow(small.before.variant, small.after(SHOULDER).variant)
     finally:
         small.problem.uncounted.clear()
     assert found.errors < small.follow(SHOULDER).errors

@@ -15,7 +15,7 @@ from shared.identification.catalogue.torque_bias import EFFECT as BIAS
 from shared.identification.catalogue.torque_saturation import EFFECT as SATURATION
 from shared.identification.effect import Candidate, Effect, Quantity
 from shared.identification.fit import Fit, polish
-from shared.identification.screen import Screened, screen
+from shared.identification.screen import Screened, Seen, screen
 from shared.identification.space import Space
 from shared.identification.subject import Subject
 from shared.sim.plant.row import Row
@@ -128,3 +128,46 @@ def test_a_push_is_looked_for_half_a_second_at_a_time_in_its_own_recording(tmp_p
     held_out = [each for each in found if each.candidate.place.endswith("in second")]
     assert len(held_out) == 3
     assert all(each.share == 0.0 for each in held_out)
+
+
+def test_of_many_parts_the_best_are_seen_in_all_at_the_look_that_showed_them(tmp_path: Path):
+    def enter(row: Row) -> None:
+        SPRING.enter(row, "elbow", np.array([0.6, 0.3]))
+
+    problem = problem_of(measure(tmp_path, np.random.default_rng(0), enter)).in_parts(1.0)
+    space, segments = Space(problem), problem.of("train")
+    assert len(segments) >= 8
+    fit = Fit.at(space, np.zeros(space.size), segments)
+    one = Candidate(SPRING, "elbow")
+    (found,) = screen(fit, [one], segments)
+    (half,) = screen(fit.on(problem.rows_of(segments, segments[::2])), [one], segments[::2])
+    assert found.start[1] == pytest.approx(half.start[1], rel=0.5)  # its rest: the same look
+    assert found.share == pytest.approx(half.share, rel=0.4)
+    assert found.share != half.share
+    assert len(found.signature) == len(half.signature)
+
+
+@pytest.mark.parametrize("is_calm", [True, False])
+def test_where_little_is_left_what_explained_least_is_not_looked_at_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_calm: bool
+):
+    monkeypatch.setattr("shared.identification.screen._AGAIN", 2)
+    monkeypatch.setattr("shared.identification.screen._AGAIN_LOCAL", 1)
+
+    def enter(row: Row) -> None:
+        BIAS.enter(row, "elbow", np.array([0.1]))
+
+    problem = problem_of(measure(tmp_path, np.random.default_rng(0), enter, seconds=4.0))
+    space, segments = Space(problem), problem.of("train")
+    fit = polish(space, np.zeros(space.size), segments)
+    if not is_calm:
+        fit = replace(fit, cost=fit.cost + len(fit.residual))
+    candidates = [Candidate(each, place) for each in (BIAS, SATURATION) for place in JOINTS]
+    candidates.append(Candidate(STRIBECK, "elbow"))
+    seen = Seen()
+    first = screen(fit, candidates, segments, seen)
+    assert {each.candidate for each in first} == set(candidates)
+    again = screen(fit, candidates, segments, seen)
+    assert again[0].candidate == first[0].candidate == Candidate(BIAS, "elbow")
+    assert again[0].share == first[0].share
+    assert len(again) == (3 if is_calm else len(candidates))

@@ -7,11 +7,14 @@ import pytest
 
 from shared.identification.catalogue.torque_bias import EFFECT as BIAS
 from shared.identification.conclude import conclude
-from shared.identification.fit import polish
+from shared.identification.fit import Fit, polish
 from shared.identification.searched import Search
 from shared.identification.space import Space
 from shared.identification.verdict import Unexplained
-from shared.identification.whole import fit_to_all
+from shared.identification.whole import (
+    _known,  # pyright: ignore[reportPrivateUsage]
+    fit_to_all,
+)
 from shared.sim.plant.row import Row
 from tests.searches import ELBOW, Searches
 
@@ -61,6 +64,17 @@ def test_sizes_are_told_from_all_recordings_and_held_out_figures_are_not(searche
     final = dict(zip(told, found.final.z, strict=False))
     for each in searches.problem.parameters:
         assert told[each.name] == pytest.approx(each.value(float(final[each.name])))
+
+
+def test_what_is_known_of_the_fit_is_not_simulated_again(searches: Searches):
+    """The derivative at the begin is asked of the held-out recordings alone, and is the same."""
+    found = _found(searches)
+    fresh = Fit.at(found.current.space, found.current.z, found.problem.of("train"))
+    known = _known(fresh, found.problem.of("test"))
+    everything = (*found.problem.of("train"), *found.problem.of("test"))
+    whole = Fit.at(fresh.space, fresh.z, everything)
+    np.testing.assert_array_equal(known[0], whole.residual)
+    np.testing.assert_array_equal(known[1], whole.jacobian)
 
 
 def test_the_interval_of_a_cause_that_only_all_recordings_show_is_theirs(searches: Searches):
