@@ -16,7 +16,7 @@ from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate, Effect
 from shared.identification.fit import Fit
 from shared.identification.linear import bounded, least_squares
-from shared.identification.looks import Columns, Looked, columns_of, looks_of
+from shared.identification.looks import Columns, Look, Looked, columns_of, looks_of
 from shared.identification.subject import Subject
 from shared.identification.turns import LATE
 
@@ -202,43 +202,66 @@ def _judged(fit: Fit, columns: Columns, rows: NDArray[np.bool_] | None = None) -
         columns: how candidates change its residual.
         rows: of which signatures are; all if None.
     """
+    every = [each.columns for looked in columns.values() for each in looked]
+    if not every:
+        return []
     basis, triangle = np.linalg.qr(fit.jacobian)
     left = fit.residual - basis @ (basis.T @ fit.residual)
+    moved = np.concatenate(every)
+    along = moved @ basis[: moved.shape[1]]
+    bare = -along @ basis.T
+    bare[:, : moved.shape[1]] += moved
     shown = slice(None) if rows is None else np.r_[rows, np.ones(fit.space.size, np.bool_)]
     out: list[_Judged] = []
+    begin = 0
     for candidate, looked in columns.items():
-        tried = [
-            _Judged(_judge(candidate, each, basis, triangle, left, fit, shown), each)
-            for each in looked
-        ]
-        out.append(max(tried, key=lambda each: each.screened.share))
+        tried: list[tuple[_Mixed, Looked, slice]] = []
+        for each in looked:
+            own = slice(begin, begin + len(each.columns))
+            tried.append((_mixed(fit, candidate, each.look, bare[own], left), each, own))
+            begin = own.stop
+        best, each, own = max(tried, key=lambda one: one[0].share)
+        base = -(basis.T @ fit.residual + best.sizes @ along[own])
+        shift = least_squares(triangle, base) if best.share else np.zeros(fit.space.size)
+        direction = (best.sizes @ bare[own])[shown] if best.share else np.zeros(0)
+        direction = direction / max(float(np.linalg.norm(direction)), 1e-12)
+        start = each.look.form.copy()
+        if best.share:
+            scale = each.look.scale
+            start[list(each.look.sizes)] = scale if each.look.is_level else best.sizes * scale
+        out.append(_Judged(Screened(candidate, start, shift, best.share, direction), each))
     return out
 
 
-def _judge(
-    candidate: Candidate, looked: Looked, basis: Float64, triangle: Float64,
-    left: Float64, fit: Fit, shown: slice | NDArray[np.bool_],
-) -> Screened:  # fmt: skip
-    look = looked.look
-    columns = np.pad(looked.columns, ((0, 0), (0, fit.space.size))).T
-    bare = columns - basis @ (basis.T @ columns)
-    size = np.linalg.norm(bare, axis=0)
+class _Mixed(NamedTuple):
+    """The sizes of a look, mixed so that they explain most."""
+
+    sizes: Float64
+    """float64[V], of what was simulated."""
+    share: float
+    """What that explains; 0 if nothing."""
+
+
+def _mixed(fit: Fit, candidate: Candidate, look: Look, bare: Float64, left: Float64) -> _Mixed:
+    """Return how much of each size explains most.
+
+    Args:
+        fit: what is there so far.
+        candidate: what is looked for.
+        look: its sizes.
+        bare: float64[V, M + n], what they change that the base cannot make up for.
+        left: float64[M + n], what the base leaves.
+    """
+    size = np.linalg.norm(bare, axis=1)
     if not np.isfinite(size).all() or float(size.max(initial=0.0)) < 1e-6:
-        return Screened(candidate, look.form, np.zeros(fit.space.size), 0.0, np.zeros(0))
+        return _Mixed(np.zeros(len(bare)), 0.0)
     found = candidate.effect.quantities(fit.space.problem.subject, candidate.place)
     quantities = [found[index] for index in look.sizes]
-    low = np.array([each.low / each.probe for each in quantities])
-    high = np.array([each.high / each.probe for each in quantities])
-    scale = look.scale
-    best = bounded(bare, -left, low / scale, np.maximum(high, low + 1e-9) / scale)
+    low = np.array([each.low / each.probe for each in quantities]) / look.scale
+    high = np.array([each.high / each.probe for each in quantities]) / look.scale
+    best = bounded(bare.T, -left, low, np.maximum(high, low + 1e-9 / look.scale))
     if look.is_level:
         best = np.clip(best, 1.0 / _NEAR, _NEAR)
-    explained = bare @ best
+    after = left + best @ bare
     total = float(left @ left)
-    share = (total - float((left + explained) @ (left + explained))) / max(total, 1e-12)
-    shift = least_squares(triangle, -(basis.T @ (fit.residual + columns @ best)))
-    direction = explained[shown]
-    direction = direction / max(float(np.linalg.norm(direction)), 1e-12)
-    start = look.form.copy()
-    start[list(look.sizes)] = scale if look.is_level else best * scale
-    return Screened(candidate, start, shift, share, direction)
+    return _Mixed(best, (total - float(after @ after)) / max(total, 1e-12))

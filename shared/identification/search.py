@@ -7,7 +7,7 @@ from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
 from shared.identification.family import Family, look_elsewhere, relatives
 from shared.identification.fewer import one_for_many, prune
-from shared.identification.fit import Fit, polish
+from shared.identification.fit import Fit, go_down, polish
 from shared.identification.gate import (
     LEAST_SHARE,
     compare,
@@ -128,7 +128,8 @@ def _round(
         return False
     best, rivals = _simplest(_sure(useful, train), found.rng)
     rivals = tuple(one for one in rivals if _is_rival(found, best, one, train, test))
-    fit = polish(best.fit.space, best.fit.z, train, 4, enough=1e-4)
+    begun = go_down(best.fit, train)  # with the derivative that it has
+    fit = polish(best.fit.space, begun.z, train, 4, enough=1e-4)
     losses = stretches(found.problem, fit.variant, test)
     gain, fitted = judged(found, best.candidate, so_far(found), Model(fit, losses))
     if gain.loss <= best.gain.loss and (best.is_event or gain.is_useful(base)):
