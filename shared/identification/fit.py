@@ -28,6 +28,8 @@ _NEARLY = 0.01
 """A second start that comes down to so little more than the first one has found the same."""
 _SLIGHT = 0.01
 """A step with a mended derivative that takes off less than this share is its last one."""
+_NEAR_NOISE = 1.5
+"""Mean square residual, in noise floors, from which the base may be bent towards a cause."""
 AGREE = 0.02
 """Starts agree whose costs differ by less than this share."""
 
@@ -51,6 +53,12 @@ class Fit:
     def variant(self) -> Variant:
         """Return the model that it is."""
         return self.space.variant(self.z)
+
+    @property
+    def is_near_noise(self) -> bool:
+        """Return whether hardly more than noise, as repeats measured it, is left."""
+        count = len(self.residual) - self.space.size
+        return self.space.problem.noise.is_measured and 2.0 * self.cost < _NEAR_NOISE * count
 
     @functools.cached_property
     def spread(self) -> Float64:

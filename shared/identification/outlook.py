@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from shared.identification.gate import stretches
-from shared.identification.screen import Screened, is_calm
+from shared.identification.screen import Screened
 from shared.identification.searched import Search, held_of
 
 _SMALL = 0.02
@@ -28,7 +28,7 @@ def hopeless(found: Search) -> Callable[[Screened], bool]:
     Args:
         found: the search so far.
     """
-    if found.problem.noise.memory is None or not is_calm(found.parts):
+    if found.problem.noise.memory is None or not found.parts.is_near_noise:
         return lambda one: False
     return lambda one: _is_hopeless(found, one)
 

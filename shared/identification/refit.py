@@ -25,8 +25,6 @@ _MENDING = (1e-4, 1e-2, 1.0)
 _PARTS = (1.0, 0.5, 0.25)
 """Of the way to where the screen expects the best fit, for a start."""
 _ENOUGH = 0.01
-_BENT = 1.5
-"""Mean square residual, in noise floors, from which the base may be bent towards a cause."""
 _STRAIGHT = 0.15
 """Of a change, that a derivative may be off by to do for good."""
 _EVERY = 2
@@ -77,8 +75,7 @@ def refit(
     down = _descend(space, ways, known.jacobian, picked, fit.space.size)
     found = [down]
     is_plain = bool(fit.space.candidates) and not any(each.phase for each in quantities)
-    is_near = problem.noise.is_measured and 2.0 * fit.cost < _BENT * len(rows)
-    if not (is_plain and is_near):
+    if not (is_plain and fit.is_near_noise):
         found.append(_from_nominal(fit, nominal, screened, picked, rows))
     best = min(found, key=lambda one: one.cost)
     z, cost = best.z, best.cost

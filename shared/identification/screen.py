@@ -30,10 +30,9 @@ _PLAIN = 10.0
 """Mean square residual, in noise floors, from which it is: what is small takes all parts."""
 _NEAR = 2.0
 """An effect that acts from some size on is looked at where it does no more than twice too much."""
-CALM = 1.5
-"""Mean square residual, in noise floors, up to which hardly more than noise is left."""
 _AGAIN, _AGAIN_LOCAL = 40, 2
-"""Candidates that are looked at again then: of those that act at any size, and of the others."""
+"""Candidates that are looked at again where hardly more than noise is left: of those that act at
+any size, and of the others."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +106,7 @@ def screen(
     steady = [each for each in lasting if _is_steady(subject, each)]
     local = [each for each in lasting if not _is_steady(subject, each)]
     part = fit.on(rows)
-    if seen is not None and is_calm(fit):
+    if seen is not None and fit.is_near_noise:
         steady = _once_more(part, steady, seen.steady, _AGAIN)
         local = _once_more(fit, local, seen.local, _AGAIN_LOCAL)
     columns = columns_of(part, looks_of(subject, steady), picked)
@@ -127,12 +126,6 @@ def screen(
         columns = columns_of(fit, looks_of(subject, own), segments, acted)
         found += [each.screened for each in _judged(fit, columns, rows)]
     return sorted(found, key=lambda each: -each.share)
-
-
-def is_calm(fit: Fit) -> bool:
-    """Return whether hardly more than noise is left of what was fitted to."""
-    is_measured = fit.space.problem.noise.is_measured
-    return is_measured and 2.0 * fit.cost < CALM * len(fit.residual)
 
 
 def _once_more(
@@ -221,14 +214,13 @@ def _judged(fit: Fit, columns: Columns, rows: NDArray[np.bool_] | None = None) -
             tried.append((_mixed(fit, candidate, each.look, bare[own], left), each, own))
             begin = own.stop
         best, each, own = max(tried, key=lambda one: one[0].share)
-        base = -(basis.T @ fit.residual + best.sizes @ along[own])
-        shift = least_squares(triangle, base) if best.share else np.zeros(fit.space.size)
-        direction = (best.sizes @ bare[own])[shown] if best.share else np.zeros(0)
-        direction = direction / max(float(np.linalg.norm(direction)), 1e-12)
-        start = each.look.form.copy()
+        start, shift, direction = each.look.form.copy(), np.zeros(fit.space.size), np.zeros(0)
         if best.share:
-            scale = each.look.scale
-            start[list(each.look.sizes)] = scale if each.look.is_level else best.sizes * scale
+            scale = 1.0 if each.look.is_level else best.sizes
+            start[list(each.look.sizes)] = scale * each.look.scale
+            shift = least_squares(triangle, -(basis.T @ fit.residual + best.sizes @ along[own]))
+            direction = (best.sizes @ bare[own])[shown]
+            direction = direction / max(float(np.linalg.norm(direction)), 1e-12)
         out.append(_Judged(Screened(candidate, start, shift, best.share, direction), each))
     return out
 

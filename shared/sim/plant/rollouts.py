@@ -298,7 +298,6 @@ class Rollouts:
             self._speed_before = np.array(qvel[arms, moved])
         for index in range(count):
             control[arms] = ctrl[:, index]
-            applied[arms] = 0.0
             added = np.zeros_like(self._drive_before)
             drive, speed = np.array(drives[arms, moved]), np.array(qvel[arms, moved])
             change, self._drive_before = drive - self._drive_before, drive
