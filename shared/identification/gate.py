@@ -6,6 +6,7 @@ loss, stretch by stretch, with an interval.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import ndtri, stdtrit
@@ -26,16 +27,6 @@ LEAST_OF_EXCESS = 0.25
 """Where repeats have measured the noise: of what is left beyond it. If that is little, some of it
 is the base's fault, and many a cause takes a little of that off; if another cause was far larger,
 it is what makes one of use beside it."""
-LEAST_AT_ALL = 0.04
-"""Of the held-out loss, then."""
-LEAST_FOLLOWED = 0.001
-"""The same of a cause that what was held out follows, see ``foretold.py``: it is sure, so small as
-it is. And of what other causes took off before: what is fast counts for most of that."""
-NOT_EXCESS = 0.1
-"""Of the noise: as much more than it is left may be the noise itself, a repeat or two say so."""
-LEAST_BESIDE = 0.005
-"""Of what other causes took off before: no law is quite the arm's, and one that is off by 7 % of
-what it does leaves so much for another to make up for."""
 FEWEST = 4
 """Stretches that it takes to be sure of anything."""
 _DRAWS = 2000
@@ -44,6 +35,43 @@ _DRAWS = 2000
 def floor_of(base: float) -> float:
     """Return what a right model would leave, given what the base fit leaves."""
     return min(FLOOR, 0.7 * base)
+
+
+class Least(NamedTuple):
+    """What a cause must take off at least, where repeats have measured the noise."""
+
+    at_all: float
+    """Of the loss that is left when it comes."""
+    beside: float
+    """Of what other causes took off before."""
+    noise: float
+    """Mean square residual that may be noise, in noise floors: of the rest it is a quarter."""
+
+
+BY_LOSS = Least(at_all=0.04, beside=0.005, noise=1.0)
+"""Beside others, since no law is quite the arm's, and one that is off by 7 % of what it does leaves
+so much for another to make up for."""
+BY_FOLLOWING = Least(at_all=0.001, beside=0.001, noise=FLOOR)
+"""Of a cause that what was held out follows, see ``foretold.py``: it is sure, so small as it is."""
+
+
+class Taken(NamedTuple):
+    """What a cause takes off a mean square residual, in noise floors."""
+
+    before: float
+    gain: float
+
+    def excess(self, least: Least) -> float:
+        """Return what it is to take off of what is more than noise."""
+        return max(LEAST_OF_EXCESS * (self.before - least.noise), 0.0)
+
+    def is_enough(self, least: Least, is_measured: bool) -> bool:
+        """Return whether it is enough of what was left before."""
+        wanted = LEAST_GAIN * self.before
+        if is_measured:
+            wanted = min(self.excess(least), max(wanted, LEAST_OF_EXCESS))
+            wanted = max(wanted, least.at_all * self.before)
+        return self.gain >= wanted
 
 
 @dataclass(frozen=True)
@@ -63,8 +91,10 @@ class Gain:
     """Standard error of the difference."""
     is_measured: bool = False
     """Whether repeats say that a mean square of 1 is noise."""
-    is_followed: bool = False
-    """Whether what was held out surely follows what the cause foretells."""
+    apart: Taken | None = None
+    """Where what was held out surely follows what the cause foretells: what it takes off there,
+    without what the base could make up for. The loss itself has in it what the recordings that were
+    fitted to do not show of the base."""
 
     @property
     def gain(self) -> float:
@@ -85,40 +115,27 @@ class Gain:
         return min(self.low / explainable, 1.0), min(self.high / explainable, 1.0)
 
     @property
-    def is_enough(self) -> bool:
-        """Return whether it is better by enough of what was left before."""
-        least = LEAST_GAIN * self.before
-        if self.is_measured:
-            least = min(self._of_excess, max(least, LEAST_OF_EXCESS))
-            at_all = LEAST_FOLLOWED if self.is_followed else LEAST_AT_ALL
-            least = max(least, at_all * self.before)
-        return self.gain >= least
-
-    @property
-    def _of_excess(self) -> float:
-        """Return what it is to take off at least of what is more than noise."""
-        noise = 1.0 + NOT_EXCESS * self.is_followed
-        return max(LEAST_OF_EXCESS * (self.before - noise), 0.0)
-
-    @property
-    def _of_others(self) -> float:
-        """Return which share of what other causes took off it is to take off at least."""
-        return LEAST_FOLLOWED if self.is_followed else LEAST_BESIDE
+    def _ways(self) -> list[tuple[Taken, Least]]:
+        """Return in which ways it is surely better, and by enough."""
+        ways: list[tuple[Taken, Least]] = []
+        if self.surely > 0.0:
+            ways.append((Taken(self.before, self.gain), BY_LOSS))
+        if self.apart is not None:
+            ways.append((self.apart, BY_FOLLOWING))
+        return [(taken, least) for taken, least in ways if taken.is_enough(least, self.is_measured)]
 
     @property
     def is_sure(self) -> bool:
         """Return whether it is surely better, and by enough."""
-        return (self.is_followed or self.surely > 0.0) and self.is_enough
+        return bool(self._ways)
 
     def is_useful(self, base: float) -> bool:
-        """Return whether it passes: surely better, and by enough."""
-        return self.is_sure and (
-            self.share(base) >= LEAST_SHARE
-            or (
-                self.is_measured
-                and self.gain >= self._of_excess
-                and self.gain >= self._of_others * (base - self.before)
-            )
+        """Return whether it passes: surely better, by enough, and of use beside what there was."""
+        if self._ways and self.share(base) >= LEAST_SHARE:
+            return True
+        return self.is_measured and any(
+            taken.gain >= max(taken.excess(least), least.beside * (base - self.before))
+            for taken, least in self._ways
         )
 
 

@@ -17,7 +17,7 @@ from shared.identification.searched import Search, held_of
 _SMALL = 0.02
 """Share of the training residual up to which what the screen expects is about what comes."""
 _FOLLOWED = 1.0
-"""Standard errors by which held-out residuals follow what has a prospect; 2.6 are to pass."""
+"""Standard errors by which held-out residuals follow what has a prospect; 1.65 are to pass."""
 _GAINS = 0.01
 """Of the held-out loss, that has a prospect all the same; 0.04 at least are to pass."""
 

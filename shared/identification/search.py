@@ -19,8 +19,10 @@ from shared.identification.look import look
 from shared.identification.outlook import hopeless
 from shared.identification.progress import Progress
 from shared.identification.refit import settle
+from shared.identification.screen import Screened
 from shared.identification.searched import (
     ALIKE,
+    NEARLY_NOISE,
     STANDS_OUT,
     TAKEN_AWAY,
     Model,
@@ -51,8 +53,8 @@ _NEARLY = 0.05
 """Of the cost on what was fitted to: by so much two causes that hardly differ may be apart."""
 _APART = 0.5
 """Cosine of what two causes explain, up to which three quarters of it are not the same."""
-_LOADS = {"counterbalance", "torque_bias"}
-"""Causes of which neither is told from the other by a few postures: near one of them a load that
+_LOADS = {"counterbalance", "torque_bias", "gravity_tilt", "joint_spring"}
+"""Causes of which none is told from the others by a few postures: near one of them a load that
 depends on posture is a constant torque, whatever numbers either has."""
 
 
@@ -117,9 +119,8 @@ def _round(
         space = Space(found.problem, each.space.candidates)
         fit = settle(space, each.z, train, found.current)
         losses = stretches(found.problem, space.variant(fit.z), test)
-        gain, fitted = judged(found, each.screened.candidate, so_far(found), Model(fit, losses))
         is_event = _explains_event(each.screened.candidate, before, fit, train)
-        tried.append(Tried(each.screened, fit, gain, losses, is_event, fitted=fitted))
+        tried.append(_tried(found, each.screened, fit, losses, is_event))
     for one in tried:
         found.tried.setdefault(one.candidate.label, one)
     base = float(found.base_losses.mean())
@@ -131,9 +132,9 @@ def _round(
     begun = go_down(best.fit, train)  # with the derivative that it has
     fit = polish(best.fit.space, begun.z, train, 4, enough=1e-4)
     losses = stretches(found.problem, fit.variant, test)
-    gain, fitted = judged(found, best.candidate, so_far(found), Model(fit, losses))
-    if gain.loss <= best.gain.loss and (best.is_event or gain.is_useful(base)):
-        best = Tried(best.screened, fit, gain, losses, best.is_event, fitted=fitted)
+    final = _tried(found, best.screened, fit, losses, best.is_event)
+    if final.gain.loss <= best.gain.loss and (best.is_event or final.gain.is_useful(base)):
+        best = final
     best, rivals, family = _elsewhere(found, best, rivals, train, test, progress)
     found.accepted.append(best)
     found.rivals.append(rivals)
@@ -148,6 +149,14 @@ def _round(
         space = Space(found.parts.space.problem, found.current.space.candidates)
         found.parts = polish(space, found.current.z, space.problem.of("train"), 2)
     return True
+
+
+def _tried(
+    found: Search, screened: Screened, fit: Fit, losses: Float64, is_event: bool
+) -> Tried:  # fmt: skip
+    """Return a candidate's fit, judged beside what there is so far."""
+    gain, fitted, foretold = judged(found, screened.candidate, so_far(found), Model(fit, losses))
+    return Tried(screened, fit, gain, losses, is_event, fitted=fitted, foretold=foretold)
 
 
 def _elsewhere(
@@ -240,12 +249,15 @@ def _simplest(useful: list[Tried], rng: np.random.Generator) -> tuple[Tried, tup
     """Return the cause to take, and those that are not told from it.
 
     Each has passed by what was held out; which of them does best, all recordings say. A stretch in
-    which something large happened has no more of a say than ``_EVENT`` usual ones. Of what does as
-    well as the best one, the simplest is taken; what needs more numbers to do no better is no
-    rival, unless it is in the nature of both that they are hardly told apart.
+    which something large happened has no more of a say than ``_EVENT`` usual ones. Where hardly
+    more than noise is left, it is what the base could not make up for of what was held out; where
+    much is, that would be most of what tells one large cause from another. Of what does as well as
+    the best one, the simplest is taken; what needs more numbers to do no better is no rival, unless
+    it is in the nature of both that they are hardly told apart.
     """
-    most = _EVENT * min(float(np.median(one.everywhere)) for one in useful)
-    left = {one.candidate: np.minimum(one.everywhere, most) for one in useful}
+    is_apart = all(one.gain.apart is not None and one.gain.before < NEARLY_NOISE for one in useful)
+    most = _EVENT * min(float(np.median(one.everywhere(is_apart))) for one in useful)
+    left = {one.candidate: np.minimum(one.everywhere(is_apart), most) for one in useful}
     best = min(useful, key=lambda one: left[one.candidate].mean())
     alike = [one for one in useful if one is best or _is_alike(best, one, left, rng)]
     fewest = min(one.numbers for one in alike)
@@ -254,19 +266,19 @@ def _simplest(useful: list[Tried], rng: np.random.Generator) -> tuple[Tried, tup
     others = [one for one in useful if one is not taken]
     as_simple = {one.candidate for one in simple}
     return taken, tuple(
-        one for one in others if one.candidate in as_simple or _is_nearly(taken, one, rng)
+        one for one in others if one.candidate in as_simple or _is_nearly(taken, one, is_apart, rng)
     )
 
 
-def _is_nearly(taken: Tried, other: Tried, rng: np.random.Generator) -> bool:
+def _is_nearly(taken: Tried, other: Tried, is_apart: bool, rng: np.random.Generator) -> bool:
     """Return whether another cause hardly differs from what is taken, in nature and in these data.
 
     Both of the recordings that were fitted to and of those that were held out.
     """
     names = other.candidate.effect.name, taken.candidate.effect.name
-    if LATE.get(names[0]) != names[1] and set(names) != _LOADS:
+    if LATE.get(names[0]) != names[1] and not set(names) <= _LOADS:
         return False
-    margin = compare(other.losses, taken.losses, rng)
+    margin = compare(other.held(is_apart), taken.held(is_apart), rng)
     return margin.gain < margin.error and other.fit.cost <= (1 + _NEARLY) * taken.fit.cost
 
 

@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shared.identification.certainty import is_there
+from shared.identification.certainty import sureness
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
 from shared.identification.fit import Fit, Start
-from shared.identification.foretold import Held
-from shared.identification.gate import Gain, compare, plain_stretches
+from shared.identification.foretold import SURELY, Foretold, Held
+from shared.identification.gate import Gain, Taken, compare, plain_stretches
 from shared.identification.left_out import left_out
 from shared.identification.problem import Problem, Variant
 from shared.identification.screen import Screened, Seen
@@ -52,16 +52,25 @@ class Tried:
     """Whether it was found at a joint because most others have it."""
     fitted: Float64 = field(default_factory=lambda: np.empty(0))
     """float64[R] of stretches of what was fitted to, with sizes in which they have no say."""
+    foretold: Foretold | None = None
+    """How what was held out follows it, where that was asked."""
 
     @property
     def candidate(self) -> Candidate:
         """Return which."""
         return self.screened.candidate
 
-    @property
-    def everywhere(self) -> Float64:
+    def held(self, is_apart: bool = False) -> Float64:
+        """Return float64[S], what it leaves of what was held out.
+
+        Args:
+            is_apart: without what the base could make up for there.
+        """
+        return self.foretold.after if is_apart and self.foretold is not None else self.losses
+
+    def everywhere(self, is_apart: bool = False) -> Float64:
         """Return float64[S + R], what it leaves of all recordings."""
-        return np.concatenate([self.losses, self.fitted])
+        return np.concatenate([self.held(is_apart), self.fitted])
 
     @property
     def numbers(self) -> int:
@@ -237,6 +246,8 @@ class Judged(NamedTuple):
     """On what was held out."""
     fitted: Float64
     """float64[R], see :class:`Tried`."""
+    foretold: Foretold | None
+    """The same."""
 
 
 def judged(found: Search, candidate: Candidate, before: Model, after: Model) -> Judged:
@@ -260,21 +271,36 @@ def judged(found: Search, candidate: Candidate, before: Model, after: Model) -> 
     is_once = candidate.recording is not None
     if is_once:
         surely = -np.inf  # there it only frees the base, of whatever it is
+    foretold = None if is_once else _foretold(found, before.fit, after.fit)
+    if foretold is not None and not foretold.is_seen:
+        surely = -np.inf  # what goes there the base could do as well
+    apart = None
+    if foretold is not None and _is_followed(found, candidate, after.fit, foretold):
+        left = float(foretold.before.mean())
+        apart = Taken(left, left - float(foretold.after.mean()))
     gain = replace(
-        gain,
-        surely=surely,
-        is_measured=found.problem.noise.is_measured,
-        is_followed=not is_once and _is_followed(found, candidate, before.fit, after.fit),
-    )
-    return Judged(gain, more.after)
+        gain, surely=surely, is_measured=found.problem.noise.is_measured, apart=apart
+    )  # fmt: skip
+    return Judged(gain, more.after, foretold)
 
 
-def _is_followed(found: Search, candidate: Candidate, before: Fit, after: Fit) -> bool:
-    """Return whether what was held out follows a cause, however little it takes off."""
+def _foretold(found: Search, before: Fit, after: Fit) -> Foretold | None:
+    """Return how what was held out follows a cause, if what was fitted to speaks for it at all."""
     if not _is_fitted(before, after):
+        return None
+    return held_of(found, before).follow(before.variant, after.variant)
+
+
+def _is_followed(found: Search, candidate: Candidate, after: Fit, foretold: Foretold) -> bool:
+    """Return whether what was held out surely follows a cause, however little it takes off.
+
+    The surer that is, the less sure the recordings need to be that were fitted to, and the other
+    way round.
+    """
+    if not foretold.is_seen:
         return False
-    is_sure = held_of(found, before).follow(before.variant, after.variant).is_sure
-    return is_sure and is_there(after, candidate, found.problem.of("train"))
+    fitted = sureness(after, candidate, found.problem.of("train"))
+    return fitted + foretold.errors >= SURELY
 
 
 def held_of(found: Search, before: Fit) -> Held:

@@ -10,8 +10,9 @@ import pytest
 from shared.identification.catalogue.gravity_tilt import EFFECT as TILT
 from shared.identification.catalogue.stribeck_friction import EFFECT as STRIBECK
 from shared.identification.certainty import (
+    _SURE,  # pyright: ignore[reportPrivateUsage]
     CALIBRATED,
-    _is_sure,  # pyright: ignore[reportPrivateUsage]
+    _errors,  # pyright: ignore[reportPrivateUsage]
     half_widths,
     is_there,
 )
@@ -77,10 +78,18 @@ def test_numbers_of_which_only_a_sum_is_known_are_surely_something_together():
     covariance = np.array([[1.0, -0.97], [-0.97, 1.0]])
     z = 1.5 * CALIBRATED * np.ones(2)
     one, both = np.array([0]), np.array([0, 1])
-    assert not _is_sure(z, covariance, one, 30)
-    assert _is_sure(z, covariance, both, 30)
-    assert not _is_sure(z * [1.0, -1.0], covariance, both, 30)
-    assert not _is_sure(z, covariance, both, 2)  # hardly anything to tell it from
+    assert _errors(z, covariance, 30, one) < _SURE < _errors(z, covariance, 30, both)
+    assert _errors(z * [1.0, -1.0], covariance, 30, both) < _SURE
+    assert _errors(z, covariance, 2, both) == 0.0  # hardly anything to tell it from
+
+
+def test_standard_errors_are_those_of_a_normal_number_that_is_as_seldom_so_far_off():
+    one = np.array([0])
+    for times in (0.5, 2.0, 4.0):
+        z = np.array([times * CALIBRATED])
+        assert _errors(z, np.eye(1), 10_000, one) == pytest.approx(times, rel=1e-3)
+        assert _errors(z, np.eye(1), 10, one) < times  # of few stretches less is sure
+    assert np.isfinite(_errors(np.array([1e6]), np.eye(1), 32, one))
 
 
 def test_of_what_is_nothing_a_twentieth_looks_sure():
@@ -90,5 +99,5 @@ def test_of_what_is_nothing_a_twentieth_looks_sure():
     for _ in range(2000):
         seen = rng.normal(size=(13, 3)) @ spread.T
         told = np.cov(seen, rowvar=False) / 13.0 / CALIBRATED**2
-        sure += _is_sure(seen.mean(axis=0), told, np.arange(3), 12)
+        sure += _errors(seen.mean(axis=0), told, 12, np.arange(3)) > _SURE
     assert 0.035 < sure / 2000 < 0.065

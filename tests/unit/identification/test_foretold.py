@@ -9,7 +9,11 @@ from shared.identification.catalogue.coulomb_friction import EFFECT as COULOMB
 from shared.identification.catalogue.load_friction import EFFECT as LOAD
 from shared.identification.effect import Candidate
 from shared.identification.fit import Fit, polish
-from shared.identification.foretold import Foretold, Held
+from shared.identification.foretold import (
+    Foretold,
+    Held,
+    _slow,  # pyright: ignore[reportPrivateUsage]
+)
 from shared.identification.gate import compare, stretches
 from shared.identification.hidden.generator import simulated
 from shared.identification.hidden.recipe import Recipe, wish_of
@@ -50,16 +54,16 @@ def test_what_is_held_out_follows_the_right_cause_where_its_loss_says_little(sma
     losses = [stretches(small.problem, fit.variant, test) for fit in (small.before, after)]
     gain = compare(losses[0], losses[1], np.random.default_rng(0))
     found = small.held.follow(small.before.variant, after.variant)
-    assert found.is_sure
+    assert found.is_seen
     assert found.share == pytest.approx(1.0, abs=0.5)
     assert found.errors > 1.3 * gain.gain / gain.error
 
 
 def test_it_does_not_follow_another_cause_nor_one_that_is_not_there(small: Looked):
-    assert not small.follow(ELBOW).is_sure
+    assert not small.follow(ELBOW).is_seen
     nothing = Looked("")
-    assert not nothing.follow(SHOULDER).is_sure
-    assert not nothing.follow(ELBOW).is_sure
+    assert not nothing.follow(SHOULDER).is_seen
+    assert not nothing.follow(ELBOW).is_seen
 
 
 def test_what_the_base_could_make_up_for_is_no_evidence(small: Looked):
@@ -88,10 +92,27 @@ def test_stretches_that_do_not_count_have_no_say(small: Looked):
 
 
 @pytest.mark.parametrize(
-    ("errors", "share", "is_sure"),
-    [(3.0, 0.9, True), (2.0, 0.9, False), (5.0, 0.2, False), (-5.0, -0.9, False)],
+    ("errors", "share", "is_seen"),
+    [(3.0, 0.9, True), (1.0, 0.9, False), (5.0, 0.2, False), (-5.0, -0.9, False)],
 )
-def test_it_is_sure_if_it_is_beyond_chance_and_about_as_much_as_foretold(
-    errors: float, share: float, is_sure: bool
+def test_it_is_seen_if_it_is_beyond_chance_and_about_as_much_as_foretold(
+    errors: float, share: float, is_seen: bool
 ):
-    assert Foretold(errors, share).is_sure == is_sure
+    assert Foretold(errors, share).is_seen == is_seen
+
+
+def test_what_it_takes_off_is_told_stretch_by_stretch_without_what_the_base_could_do(small: Looked):
+    found = small.follow(SHOULDER)
+    assert len(found.before) == len(found.after) == 10
+    assert found.before.mean() > found.after.mean()
+    worse = replace(small.before, z=small.before.z + 0.01)
+    bent = small.held.follow(worse.variant, small.after(SHOULDER).variant)
+    assert bent.before.mean() == pytest.approx(found.before.mean(), rel=0.02)
+
+
+def test_what_drifts_for_seconds_is_less_evidence_than_what_comes_and_goes():
+    rng = np.random.default_rng(3)
+    white = rng.standard_normal(4000)
+    slow = np.convolve(white, np.ones(8) / np.sqrt(8.0), mode="same")
+    assert _slow(white) == pytest.approx(float(white @ white), rel=0.15)
+    assert _slow(slow) > 2.5 * float(slow @ slow)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shared.identification.gate import STRETCH, Gain, compare, floor_of, stretches
+from shared.identification.gate import STRETCH, Gain, Taken, compare, floor_of, stretches
 from tests.measured import measure, nominal, problem_of
 
 
@@ -99,7 +99,7 @@ def test_how_much_is_enough_depends_on_what_is_left_beyond_measured_noise(
 ):
     loss = before - gain
     found = Gain(loss, before, 0.5 * gain, 1.5 * gain, 0.1 * gain, 0.2 * gain, is_measured)
-    assert found.is_enough == is_enough
+    assert found.is_sure == is_enough
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_how_much_is_enough_depends_on_what_is_left_beyond_measured_noise(
     [
         (1.05, 0.004, True),
         (1.05, 0.0005, False),  # of no use to anybody
-        (1.4, 0.06, False),  # the base is not quite right: it is sure, and may be the base's fault
+        (1.4, 0.05, False),  # the base is not quite right: it is sure, and may be the base's fault
         (1.4, 0.09, True),
     ],
 )
@@ -116,7 +116,14 @@ def test_of_a_cause_that_what_is_held_out_follows_little_is_enough(
 ):
     found = Gain(
         before - gain, before, -gain, 3.0 * gain, -2.0 * gain, gain, is_measured=True,
-        is_followed=True,
+        apart=Taken(before, gain),
     )  # fmt: skip
-    assert found.is_enough == found.is_sure == found.is_useful(before) == is_enough
-    assert not replace(found, is_followed=False).is_sure
+    assert found.is_sure == found.is_useful(before) == is_enough
+    assert not replace(found, apart=None).is_sure
+
+
+def test_what_was_not_shown_of_the_base_has_no_say_in_a_cause_that_is_followed():
+    """The loss itself is of a base that is wrong where only held-out motion goes."""
+    found = Gain(1.99, 2.0, -0.1, 0.12, -0.2, 0.05, is_measured=True, apart=Taken(1.02, 0.04))
+    assert found.is_useful(2.0)
+    assert not replace(found, apart=Taken(1.6, 0.04)).is_sure

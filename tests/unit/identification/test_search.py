@@ -13,12 +13,15 @@ import pytest
 
 from shared.identification.catalogue.command_latency import EFFECT as LATE
 from shared.identification.catalogue.counterbalance import EFFECT as BALANCE
+from shared.identification.catalogue.gravity_tilt import EFFECT as TILT
 from shared.identification.catalogue.sample_and_hold import EFFECT as TURNS
 from shared.identification.catalogue.torque_bias import EFFECT as BIAS
 from shared.identification.catalogue.torque_gain import EFFECT as GAIN
-from shared.identification.dataset.types import Dataset
+from shared.identification.dataset.types import Dataset, Float64
 from shared.identification.effect import Candidate
 from shared.identification.find import identify
+from shared.identification.foretold import Foretold
+from shared.identification.gate import Taken
 from shared.identification.hidden.generator import hide
 from shared.identification.hidden.recipe import Recipe, wish_of
 from shared.identification.progress import silent
@@ -83,7 +86,7 @@ def test_what_happened_once_has_no_large_say_in_which_cause_does_best(searches: 
     event = np.where(np.arange(24) == 7, 90.0, 0.0)
     right = replace(searches.tried(ELBOW, _BAD, _GOOD), fitted=fitted + event)
     wrong = replace(searches.tried(LIFT, _BAD, _GOOD + 0.3), fitted=fitted + 0.2 + 0.8 * event)
-    assert wrong.everywhere.mean() < right.everywhere.mean()
+    assert wrong.everywhere().mean() < right.everywhere().mean()
     assert _simplest([wrong, right], rng) == (right, ())
 
 
@@ -132,6 +135,43 @@ def test_a_counterbalance_and_a_constant_torque_are_rivals_unless_one_does_surel
     taken, rivals = _simplest(list(better), np.random.default_rng(0))
     assert taken is better[1]
     assert [one.candidate for one in rivals] == [ELBOW]
+
+
+def test_a_tilt_that_is_not_told_from_a_torque_is_its_rival_though_it_has_more_numbers(
+    searches: Searches,
+):
+    torque = searches.tried(ELBOW, _BAD, _GOOD)
+    about = 0.01 + np.tile([-0.06, 0.06], 4)
+    tilt = searches.tried(Candidate(TILT, ""), _BAD, _GOOD + about, numbers=2)
+    tilt = replace(tilt, fit=replace(tilt.fit, cost=torque.fit.cost))
+    assert _simplest([tilt, torque], np.random.default_rng(0)) == (torque, (tilt,))
+    surely = replace(tilt, losses=_GOOD + 0.05)
+    assert _simplest([surely, torque], np.random.default_rng(0)) == (torque, ())
+
+
+def test_of_causes_that_are_followed_the_best_is_told_without_what_the_base_could_do(
+    searches: Searches,
+):
+    """Where only held-out motion goes the base is wrong, with whichever cause, by chance less."""
+    there = np.where(np.arange(8) % 3 == 0, 3.0, 0.0)
+    right = searches.tried(ELBOW, _BAD, _GOOD + there)
+    wrong = searches.tried(LIFT, _BAD, _GOOD + 0.5 * there + 0.3)
+    assert _simplest([right, wrong], np.random.default_rng(0))[0] is wrong
+
+    def followed(one: Tried, after: Float64) -> Tried:
+        told = Foretold(9.0, 0.9, _GOOD + 2.0, after)
+        gain = replace(one.gain, before=left, apart=Taken(3.1, 3.1 - float(after.mean())))
+        return replace(one, foretold=told, gain=gain)
+
+    left = 1.2
+
+    both = [followed(right, _GOOD), followed(wrong, _GOOD + 0.3)]
+    assert _simplest(both, np.random.default_rng(0)) == (both[0], ())
+    mixed = [both[0], wrong]  # of one it is not known
+    assert _simplest(mixed, np.random.default_rng(0))[0] is wrong
+    left = 9.0  # there the base would make up for what is large
+    much = [followed(right, _GOOD), followed(wrong, _GOOD + 0.3)]
+    assert _simplest(much, np.random.default_rng(0))[0] is much[1]
 
 
 def test_what_explains_something_else_as_well_is_no_rival(searches: Searches):

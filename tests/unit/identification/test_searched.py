@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from shared.identification import searched
+from shared.identification.foretold import Foretold
 from shared.identification.searched import Model, foretells, judged
 from tests.searches import ELBOW, Searches
 
@@ -32,3 +34,33 @@ def test_an_event_that_a_cause_foretells_makes_it_sure(tmp_path):
     assert judged(found, ELBOW, before, Model(fit, _USUAL)).gain.is_sure
     some = np.where(np.arange(22) == 8, 7.0, _USUAL)
     assert not judged(found, ELBOW, before, Model(fit, some)).gain.is_sure
+
+
+@pytest.mark.parametrize(
+    ("fitted", "errors", "share", "is_followed", "is_sure"),
+    [
+        (2.0, 3.0, 0.8, True, True),
+        (3.5, 1.8, 0.8, True, True),  # surer by what was fitted to, and the other way round
+        (1.0, 4.0, 0.8, True, True),
+        (1.8, 2.6, 0.8, False, True),  # then the loss itself has to say so
+        (9.0, 1.0, 0.8, False, False),  # what goes there the base could do as well
+        (9.0, 9.0, 0.2, False, False),
+    ],
+)
+def test_a_cause_is_followed_by_what_was_fitted_to_and_what_was_held_out_together(
+    tmp_path, monkeypatch, fitted: float, errors: float, share: float, is_followed: bool,
+    is_sure: bool,
+):  # fmt: skip
+    searches = Searches(tmp_path)
+    found = searches.search(_USUAL + 2.0)
+    told = Foretold(errors, share, _USUAL + 0.5, _USUAL)
+    monkeypatch.setattr(searched, "_foretold", lambda *rest: told)
+    monkeypatch.setattr(searched, "sureness", lambda *rest: fitted)
+    fit = searches.tried(ELBOW, _USUAL + 2.0, _USUAL).fit
+    gain, _, foretold = judged(
+        found, ELBOW, Model(searches.base, _USUAL + 2.0), Model(fit, _USUAL)
+    )  # fmt: skip
+    assert foretold is told
+    assert (gain.apart is not None) == is_followed
+    assert gain.apart is None or gain.apart.gain == pytest.approx(0.5)
+    assert gain.is_sure == is_sure
