@@ -29,6 +29,8 @@ _FOLLOWED = 1.65
 """Of those held out alone, at least (95 %)."""
 _LEAST = 0.35
 """Of what is foretold, that has to be there."""
+_KEPT = 0.1
+"""Of the square of what a cause changes: of less nothing is told by what is left of it."""
 _NEAR = 4
 """Stretches whose residuals may go together."""
 _RANK = 1e-6
@@ -43,10 +45,20 @@ class Foretold:
     """How many standard errors from not at all (1)."""
     share: float
     """Of what is foretold, that is there; 1 if the cause is right (1)."""
+    kept: float = 1.0
+    """Of the square of what it changes, that neither the base nor links could make up for (1)."""
     before: Float64 = field(default_factory=lambda: np.empty(0), compare=False)
     """float64[S], mean squares of stretches without what the base could make up for."""
     after: Float64 = field(default_factory=lambda: np.empty(0), compare=False)
     """float64[S], the same with the cause."""
+
+    @property
+    def is_refuted(self) -> bool:
+        """Return whether they do not, though little else could have made up for it.
+
+        A wrong inertia of a link cannot be seen there: the links' inertia is taken out.
+        """
+        return not self.is_seen and self.kept >= _KEPT
 
     @property
     def is_seen(self) -> bool:
@@ -87,12 +99,13 @@ class Held:
         """
         problem = self.fit.space.problem
         found = problem.vector([before, after], self._test) * self._counts
+        whole = float(np.sum((found[0] - found[1]) ** 2))
         found = found - (found @ self._basis) @ self._basis.T
         losses = np.array([np.mean(found[:, each] ** 2, axis=1) for each in self._stretches]).T
         way: Float64 = found[0] - found[1]
         length = float(way @ way)
         if length < 1e-12:
-            return Foretold(0.0, 0.0, losses[0], losses[1])
+            return Foretold(0.0, 0.0, 0.0, losses[0], losses[1])
         along = float(way @ found[0])
         left = found[1]
         white = length * max(float(left @ left) / int(self._counts.sum()), 1.0)
@@ -101,7 +114,8 @@ class Held:
             for clusters in (self._stretches, self._channels)
         )
         variance = max(white, _slow(of_stretches), float(of_channels @ of_channels))
-        return Foretold(along / math.sqrt(variance), along / length, losses[0], losses[1])
+        errors = along / math.sqrt(variance)
+        return Foretold(errors, along / length, length / whole, losses[0], losses[1])
 
 
 def _slow(sums: Float64) -> float:

@@ -272,7 +272,7 @@ def judged(found: Search, candidate: Candidate, before: Model, after: Model) -> 
     if is_once:
         surely = -np.inf  # there it only frees the base, of whatever it is
     foretold = None if is_once else _foretold(found, before.fit, after.fit)
-    if foretold is not None and not foretold.is_seen:
+    if foretold is not None and foretold.is_refuted:
         surely = -np.inf  # what goes there the base could do as well
     apart = None
     if foretold is not None and _is_followed(found, candidate, after.fit, foretold):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from shared.identification.catalogue.coulomb_friction import EFFECT as COULOMB
+from shared.identification.catalogue.inertia_error import EFFECT as INERTIA
 from shared.identification.catalogue.load_friction import EFFECT as LOAD
 from shared.identification.effect import Candidate
 from shared.identification.fit import Fit, polish
@@ -76,7 +77,7 @@ def test_what_the_base_could_make_up_for_is_no_evidence(small: Looked):
 def test_a_cause_that_changes_nothing_is_not_followed(small: Looked):
     grown = small.before.space.grown(Candidate(COULOMB, "elbow"))
     same = replace(small.before, space=grown, z=np.r_[small.before.z, 0.0])
-    assert small.held.follow(small.before.variant, same.variant) == Foretold(0.0, 0.0)
+    assert small.held.follow(small.before.variant, same.variant) == Foretold(0.0, 0.0, 0.0)
 
 
 def test_stretches_that_do_not_count_have_no_say(small: Looked):
@@ -108,6 +109,18 @@ def test_what_it_takes_off_is_told_stretch_by_stretch_without_what_the_base_coul
     worse = replace(small.before, z=small.before.z + 0.01)
     bent = small.held.follow(worse.variant, small.after(SHOULDER).variant)
     assert bent.before.mean() == pytest.approx(found.before.mean(), rel=0.02)
+
+
+def test_a_link_that_is_heavier_than_its_file_is_not_refuted_by_what_leaves_links_out(
+    small: Looked,
+):
+    grown = small.before.space.grown(Candidate(INERTIA, "shoulder"))
+    heavier = grown.variant(np.r_[small.before.z, 1.0])
+    found = small.held.follow(small.before.variant, heavier)
+    assert not found.is_seen
+    assert found.kept < 0.1 < small.follow(SHOULDER).kept
+    assert not found.is_refuted
+    assert replace(found, kept=0.5).is_refuted
 
 
 def test_what_drifts_for_seconds_is_less_evidence_than_what_comes_and_goes():

@@ -159,7 +159,7 @@ def test_of_causes_that_are_followed_the_best_is_told_without_what_the_base_coul
     assert _simplest([right, wrong], np.random.default_rng(0))[0] is wrong
 
     def followed(one: Tried, after: Float64) -> Tried:
-        told = Foretold(9.0, 0.9, _GOOD + 2.0, after)
+        told = Foretold(9.0, 0.9, 1.0, _GOOD + 2.0, after)
         gain = replace(one.gain, before=left, apart=Taken(3.1, 3.1 - float(after.mean())))
         return replace(one, foretold=told, gain=gain)
 

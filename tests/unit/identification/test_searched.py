@@ -37,23 +37,24 @@ def test_an_event_that_a_cause_foretells_makes_it_sure(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("fitted", "errors", "share", "is_followed", "is_sure"),
+    ("fitted", "errors", "share", "kept", "is_followed", "is_sure"),
     [
-        (2.0, 3.0, 0.8, True, True),
-        (3.5, 1.8, 0.8, True, True),  # surer by what was fitted to, and the other way round
-        (1.0, 4.0, 0.8, True, True),
-        (1.8, 2.6, 0.8, False, True),  # then the loss itself has to say so
-        (9.0, 1.0, 0.8, False, False),  # what goes there the base could do as well
-        (9.0, 9.0, 0.2, False, False),
+        (2.0, 3.0, 0.8, 1.0, True, True),
+        (3.5, 1.8, 0.8, 1.0, True, True),  # surer by what was fitted to, and the other way round
+        (1.0, 4.0, 0.8, 1.0, True, True),
+        (1.8, 2.6, 0.8, 1.0, False, True),  # then the loss itself has to say so
+        (9.0, 1.0, 0.8, 1.0, False, False),  # what goes there the base could do as well
+        (9.0, 1.0, 0.8, 0.05, False, True),  # it is a link that weighs more: that does not show
+        (9.0, 9.0, 0.2, 1.0, False, False),
     ],
 )
 def test_a_cause_is_followed_by_what_was_fitted_to_and_what_was_held_out_together(
-    tmp_path, monkeypatch, fitted: float, errors: float, share: float, is_followed: bool,
-    is_sure: bool,
+    tmp_path, monkeypatch, fitted: float, errors: float, share: float, kept: float,
+    is_followed: bool, is_sure: bool,
 ):  # fmt: skip
     searches = Searches(tmp_path)
     found = searches.search(_USUAL + 2.0)
-    told = Foretold(errors, share, _USUAL + 0.5, _USUAL)
+    told = Foretold(errors, share, kept, _USUAL + 0.5, _USUAL)
     monkeypatch.setattr(searched, "_foretold", lambda *rest: told)
     monkeypatch.setattr(searched, "sureness", lambda *rest: fitted)
     fit = searches.tried(ELBOW, _USUAL + 2.0, _USUAL).fit
