@@ -1,5 +1,7 @@
 """Which residuals may be off together: so many are one piece of evidence."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,14 +17,11 @@ def by_stretch(problem: Problem, segments: tuple[int, ...]) -> list[Integers]:
     A joint that is off moves what hangs on it, for as long as the arm remembers.
     """
     size = round(STRETCH / BLOCK)
-    out: list[Integers] = []
-    begin = 0
-    for rows, channels in map(problem.shape_of, segments):
-        indices = np.arange(begin, begin + rows * channels)
-        pieces = np.array_split(indices.reshape(rows, channels), max(rows // size, 1))
-        out.extend(piece.ravel() for piece in pieces)
-        begin += rows * channels
-    return out
+    return [
+        piece.ravel()
+        for _, indices in _indices(problem, segments)
+        for piece in np.array_split(indices, max(len(indices) // size, 1))
+    ]
 
 
 def by_channel(problem: Problem, segments: tuple[int, ...]) -> list[Integers]:
@@ -34,12 +33,16 @@ def by_channel(problem: Problem, segments: tuple[int, ...]) -> list[Integers]:
     if problem.noise.tracker is None:
         return []
     out: dict[tuple[int, int], list[Integers]] = {}
+    for segment, indices in _indices(problem, segments):
+        for channel, column in enumerate(indices.T):
+            out.setdefault((problem.segments[segment].trajectory, channel), []).append(column)
+    return [np.concatenate(pieces) for pieces in out.values()]
+
+
+def _indices(problem: Problem, segments: tuple[int, ...]) -> Iterator[tuple[int, Integers]]:
+    """Yield each segment with where its residuals are in the vector: int64[B, C]."""
     begin = 0
     for segment in segments:
         rows, channels = problem.shape_of(segment)
-        indices = np.arange(begin, begin + rows * channels).reshape(rows, channels)
-        for channel in range(channels):
-            key = problem.segments[segment].trajectory, channel
-            out.setdefault(key, []).append(indices[:, channel])
+        yield segment, np.arange(begin, begin + rows * channels).reshape(rows, channels)
         begin += rows * channels
-    return [np.concatenate(pieces) for pieces in out.values()]

@@ -24,7 +24,7 @@ from shared.identification.space import Space
 SURELY = 4.5
 """Standard errors that a cause is off nothing by, those of the recordings that were fitted to and
 of those that were held out together. Of a hundred candidates where there is none, the best come to
-some 4 (docs/identify.md)."""
+some 4 (ADR 0013)."""
 _FOLLOWED = 1.65
 """Of those held out alone, at least (95 %)."""
 _LEAST = 0.35
@@ -79,8 +79,8 @@ class Held:
         problem = fit.space.problem
         self._test = problem.of("test")
         self._counts = _counted(problem, self._test)
-        self._stretches = [each[self._counts[each]] for each in by_stretch(problem, self._test)]
-        self._stretches = [each for each in self._stretches if len(each)]
+        counted = (each[self._counts[each]] for each in by_stretch(problem, self._test))
+        self._stretches = [each for each in counted if len(each)]
         self._channels = by_channel(problem, self._test)
         loose = loose_parameters(problem.subject, problem.parameters)
         base = len(problem.parameters)

@@ -118,9 +118,8 @@ def _round(
         progress("decide", len(tried) / _FULL, each.screened.candidate.label)
         space = Space(found.problem, each.space.candidates)
         fit = settle(space, each.z, train, found.current)
-        losses = stretches(found.problem, space.variant(fit.z), test)
         is_event = _explains_event(each.screened.candidate, before, fit, train)
-        tried.append(_tried(found, each.screened, fit, losses, is_event))
+        tried.append(_tried(found, each.screened, fit, is_event))
     for one in tried:
         found.tried.setdefault(one.candidate.label, one)
     base = float(found.base_losses.mean())
@@ -131,8 +130,7 @@ def _round(
     rivals = tuple(one for one in rivals if _is_rival(found, best, one, train, test))
     begun = go_down(best.fit, train)  # with the derivative that it has
     fit = polish(best.fit.space, begun.z, train, 4, enough=1e-4)
-    losses = stretches(found.problem, fit.variant, test)
-    final = _tried(found, best.screened, fit, losses, best.is_event)
+    final = _tried(found, best.screened, fit, best.is_event)
     if final.gain.loss <= best.gain.loss and (best.is_event or final.gain.is_useful(base)):
         best = final
     best, rivals, family = _elsewhere(found, best, rivals, train, test, progress)
@@ -151,10 +149,9 @@ def _round(
     return True
 
 
-def _tried(
-    found: Search, screened: Screened, fit: Fit, losses: Float64, is_event: bool
-) -> Tried:  # fmt: skip
+def _tried(found: Search, screened: Screened, fit: Fit, is_event: bool) -> Tried:
     """Return a candidate's fit, judged beside what there is so far."""
+    losses = stretches(found.problem, fit.variant, found.problem.of("test"))
     gain, fitted, foretold = judged(found, screened.candidate, so_far(found), Model(fit, losses))
     return Tried(screened, fit, gain, losses, is_event, fitted=fitted, foretold=foretold)
 

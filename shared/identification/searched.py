@@ -274,13 +274,12 @@ def judged(found: Search, candidate: Candidate, before: Model, after: Model) -> 
     foretold = None if is_once else _foretold(found, before.fit, after.fit)
     if foretold is not None and foretold.is_refuted:
         surely = -np.inf  # what goes there the base could do as well
-    apart = None
-    if foretold is not None and _is_followed(found, candidate, after.fit, foretold):
-        left = float(foretold.before.mean())
-        apart = Taken(left, left - float(foretold.after.mean()))
     gain = replace(
-        gain, surely=surely, is_measured=found.problem.noise.is_measured, apart=apart
-    )  # fmt: skip
+        gain,
+        surely=surely,
+        is_measured=found.problem.noise.is_measured,
+        apart=_apart(found, candidate, after.fit, foretold),
+    )
     return Judged(gain, more.after, foretold)
 
 
@@ -291,16 +290,21 @@ def _foretold(found: Search, before: Fit, after: Fit) -> Foretold | None:
     return held_of(found, before).follow(before.variant, after.variant)
 
 
-def _is_followed(found: Search, candidate: Candidate, after: Fit, foretold: Foretold) -> bool:
-    """Return whether what was held out surely follows a cause, however little it takes off.
+def _apart(
+    found: Search, candidate: Candidate, after: Fit, foretold: Foretold | None
+) -> Taken | None:
+    """Return what a cause takes off that what was held out surely follows, however little.
 
     The surer that is, the less sure the recordings need to be that were fitted to, and the other
     way round.
     """
-    if not foretold.is_seen:
-        return False
+    if foretold is None or not foretold.is_seen:
+        return None
     fitted = sureness(after, candidate, found.problem.of("train"))
-    return fitted + foretold.errors >= SURELY
+    if fitted + foretold.errors < SURELY:
+        return None
+    before = float(foretold.before.mean())
+    return Taken(before, before - float(foretold.after.mean()))
 
 
 def held_of(found: Search, before: Fit) -> Held:
