@@ -193,7 +193,7 @@ def _why_not(
         return "" if word == "named" else "too much is left over with it" * (word == "unexplained")
     if label in rivals:
         return f"does as well as what was taken, within {ALIKE:.0%} of the gain or its error"
-    if tried.gain.surely <= 0.0:
+    if tried.gain.surely <= 0.0 and tried.gain.apart is None:
         return "no better on held-out recordings"
     if not tried.gain.is_useful(base):
         return "better, but by too little to be of use"

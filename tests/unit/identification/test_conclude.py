@@ -9,6 +9,7 @@ import pytest
 
 from shared.identification.bent import worse_than_file
 from shared.identification.conclude import conclude
+from shared.identification.gate import Taken
 from shared.identification.searched import Otherwise
 from shared.identification.verdict import Unexplained
 from tests.searches import DRAG, ELBOW, LIFT, Searches
@@ -124,6 +125,17 @@ def test_much_that_no_effect_takes_off_is_unexplained(searches: Searches):
     assert "elbow once" in found.sentence
     (scored,) = found.candidates
     assert scored.why_not == "no better on held-out recordings"
+
+
+def test_what_held_out_motion_follows_is_not_called_no_better(searches: Searches):
+    """Its loss alone does not say so; what was taken does better."""
+    taken, tried = searches.tried(DRAG, _BAD, _GOOD), searches.tried(ELBOW, _BAD, _BAD)
+    gain = dataclasses.replace(tried.gain, is_measured=True, apart=Taken(1.1, 0.05))
+    found = conclude(
+        searches.search(_BAD, taken, tried=(dataclasses.replace(tried, gain=gain),)), ()
+    )
+    whys = {each.effect: each.why_not for each in found.candidates}
+    assert whys["torque_bias"] == "explained better by what was taken"
 
 
 def test_what_stands_out_of_a_base_that_fits_is_told_with_when_it_was(searches: Searches):
