@@ -22,7 +22,7 @@ INERTIA_PRIOR = 0.1
 ``_CENTRE``, of where its centre of mass is: 5 mm, cables and screws."""
 _CENTRE = 0.05
 """(m)."""
-_LOOSE = 1.5
+LOOSE = 1.5
 """Of damping, armature and gains: a factor of 4.5 either way is unlikely."""
 _MOST_FRICTION = 30.0
 """Beyond what the model file says, in units of it: small servos rub with ten times that."""
@@ -65,7 +65,7 @@ def base_parameters(subject: Subject) -> tuple[BaseParameter, ...]:
             nominal = float(getattr(model, field)[dof])
             if nominal > 0.0:
                 found.append(
-                    _factor(f"{word} {label}", unit, nominal, _LOOSE, _setter(field, joint))
+                    _factor(f"{word} {label}", unit, nominal, LOOSE, _setter(field, joint))
                 )
         if (friction := _friction_scale(subject, dof)) > 0.0:
             nominal = float(model.dof_frictionloss[dof])
@@ -78,7 +78,7 @@ def base_parameters(subject: Subject) -> tuple[BaseParameter, ...]:
                     scale=friction,
                     low=-nominal / friction,
                     high=_MOST_FRICTION if nominal > 0.0 else 5.0,
-                    prior=_LOOSE,
+                    prior=LOOSE,
                     change=_setter("dof_frictionloss", joint),
                 )
             )
@@ -163,7 +163,7 @@ def _gains(subject: Subject) -> list[BaseParameter]:
             ("kv", kv, _kv_setter(actuator)),
         ):
             if nominal > 0.0:
-                found.append(_factor(f"{word} {label}", "", nominal, _LOOSE, change))
+                found.append(_factor(f"{word} {label}", "", nominal, LOOSE, change))
     return found
 
 
@@ -229,7 +229,7 @@ def _centres(subject: Subject, label: str, body: int) -> list[BaseParameter]:
     Along an axis that every hinge before it turns about it is not felt.
     """
     model = subject.nominal.model
-    is_turned = turned_axes(model, body)
+    is_turned = turned_axes(subject.plant, model, body)
     return [
         BaseParameter(
             name=f"centre_{word} {label}",

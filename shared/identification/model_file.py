@@ -96,7 +96,7 @@ def _pr2_file(
         if not entry.structure and changed <= {"fields"} and touched <= FIELDS:
             native.append(entry)
             carried.append(_said(entry, True, f"as {_words(touched)} of the arm"))
-        elif not entry.structure and changed <= {"fields", "weights"} and touched <= FIELDS:
+        elif not entry.structure and changed <= {"fields", "forces"} and touched <= FIELDS:
             native.append(entry)
             said = f"its inertia as {_words(touched)} of the arm; its weight the file cannot hold"
             carried.append(_said(entry, False, said))

@@ -56,6 +56,9 @@ _APART = 0.5
 _LOADS = {"counterbalance", "torque_bias", "gravity_tilt", "joint_spring"}
 """Causes of which none is told from the others by a few postures: near one of them a load that
 depends on posture is a constant torque, whatever numbers either has."""
+_LEANS = {"encoder_offset", "payload"}
+"""A tool that is heavy beside its middle hangs as one does at a joint of which the encoder has
+another zero; what a payload's shape adds to that is not modelled."""
 
 
 def search(found: Search, progress: Progress) -> None:
@@ -272,11 +275,13 @@ def _is_nearly(taken: Tried, other: Tried, is_apart: bool, rng: np.random.Genera
 
     Both of the recordings that were fitted to and of those that were held out.
     """
-    names = other.candidate.effect.name, taken.candidate.effect.name
-    if LATE.get(names[0]) != names[1] and not set(names) <= _LOADS:
+    name, of_taken = other.candidate.effect.name, taken.candidate.effect.name
+    leans = {name, of_taken} == _LEANS
+    if not leans and LATE.get(name) != of_taken and not {name, of_taken} <= _LOADS:
         return False
     margin = compare(other.held(is_apart), taken.held(is_apart), rng)
-    return margin.gain < margin.error and other.fit.cost <= (1 + _NEARLY) * taken.fit.cost
+    least = max(margin.error, ALIKE * taken.gain.gain if leans else 0.0)
+    return margin.gain < least and other.fit.cost <= (1 + _NEARLY) * taken.fit.cost
 
 
 def _is_alike(

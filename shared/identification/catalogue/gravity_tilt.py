@@ -39,8 +39,12 @@ class GravityTilt:
         return ()
 
     def enter(self, row: Row, place: str, values: Float64) -> None:
-        """Turn gravity: as a vector of angles, the whole turn at once."""
+        """Turn gravity: as a vector of angles, the whole turn at once.
+
+        A controller that carries the weight of links goes on as if the base were level.
+        """
         gravity = row.field("opt.gravity")
+        level = gravity.copy()
         turn = np.zeros(3)
         for axis, angle in zip(horizontal_axes(gravity), values, strict=True):
             turn["xyz".index(axis)] = angle
@@ -53,6 +57,10 @@ class GravityTilt:
             + math.sin(size) * np.cross(axis, gravity)
             + (1.0 - math.cos(size)) * (axis @ gravity) * axis
         )
+        carried = row.current("body_gravcomp") * row.current("body_mass")
+        for body in np.flatnonzero(carried):
+            x, y, z = carried[body] * (gravity - level)
+            row.forces[int(body)] = (float(x), float(y), float(z))
 
 
 EFFECT = GravityTilt()

@@ -43,12 +43,14 @@ class InertiaError:
         return ()
 
     def enter(self, row: Row, place: str, values: Float64) -> None:
-        """Scale all bodies of the link."""
+        """Scale all bodies of the link; a controller that carries its weight goes by the model."""
         if not values[0]:
             return
         link = np.flatnonzero(row.model.body_weldid == row.model.body_weldid[row.body_of(place)])
         row.field("body_mass")[link] *= 1.0 + float(values[0])
         row.field("body_inertia")[link] *= 1.0 + float(values[0])
+        if row.model.body_gravcomp[link].any():
+            row.field("body_gravcomp")[link] /= 1.0 + float(values[0])
 
 
 EFFECT = InertiaError()

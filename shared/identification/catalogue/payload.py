@@ -1,18 +1,24 @@
 """The tool carries more, or less, than the model says."""
 
+from typing import Final
+
+import numpy as np
+
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
 from shared.identification.subject import Subject
+from shared.sim.plant.kinematics import turned_axes
 from shared.sim.plant.plant import is_weightless
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure
 
 _GRAVITY = 9.81
 """m/s^2."""
+OFF_CENTRE: Final = "tool off its centre"
 
 
 class Payload:
-    """A point mass at the tool's centre of mass."""
+    """A mass at the tool's centre of mass, or one beside it, which then moves that."""
 
     name = "payload"
     title = "the tool is heavier than the model says"
@@ -20,12 +26,19 @@ class Payload:
     side: Side = "plant"
 
     def places(self, subject: Subject) -> tuple[str, ...]:
-        """Return the whole arm: the tool is where it is."""
-        return ("",)
+        """Return the whole arm: the tool is where it is; and beside its centre, if that is felt.
+
+        Where the controller carries the tool's weight, it does so where the centre is by then.
+        """
+        return ("", OFF_CENTRE) if _hangs(subject) and _axes(subject) else ("",)
 
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
-        """Return the mass that the model lacks."""
-        return (Quantity("mass", "kg", 0.0, 10.0, probe=0.3),)
+        """Return the mass that the model lacks, and by how much it moves the centre of all."""
+        mass = Quantity("mass", "kg", 0.0, 10.0, probe=0.3)
+        if place != OFF_CENTRE:
+            return (mass,)
+        moved = (Quantity(f"centre_{axis}", "m", -0.2, 0.2, probe=0.01) for axis in _axes(subject))
+        return (mass, *moved)
 
     def structure(self, subject: Subject, place: str) -> Structure:
         """Return nothing: the body is there."""
@@ -34,15 +47,35 @@ class Payload:
     def enter(self, row: Row, place: str, values: Float64) -> None:
         """Make the tool's body heavier, its radius of gyration unchanged.
 
-        The springs of a counterbalanced arm do not know of it: there its weight pulls by itself.
+        The springs of a counterbalanced arm, or a controller that carries its weight, do not know
+        of it: there it pulls by itself.
         """
-        body = row.tool_body()
+        body, added = row.tool_body(), float(values[0])
         mass = row.field("body_mass")
         if is_weightless(row.model):
-            row.weights[body] = _GRAVITY * float(values[0])
-        grown = (mass[body] + float(values[0])) / mass[body]
+            row.forces[body] = (0.0, 0.0, -_GRAVITY * added)
+        grown = (mass[body] + added) / mass[body]
         row.field("body_inertia")[body] *= grown
         mass[body] *= grown
+        if row.model.body_gravcomp[body]:
+            row.field("body_gravcomp")[body] /= grown
+        if place == OFF_CENTRE:
+            turned = np.array(turned_axes(row.plant, row.model, body))
+            row.field("body_ipos")[body, turned] += values[1:]
+
+
+def _hangs(subject: Subject) -> bool:
+    """Return whether the tool's weight is the joints' to carry."""
+    model = subject.nominal.model
+    tool = int(model.body(subject.plant.tool_body).id)
+    return subject.has_gravity and not model.body_gravcomp[tool]
+
+
+def _axes(subject: Subject) -> str:
+    """Return along which axes of the tool's body its joints feel where it is heavy."""
+    model = subject.nominal.model
+    turned = turned_axes(subject.plant, model, int(model.body(subject.plant.tool_body).id))
+    return "".join(axis for axis, is_turned in zip("xyz", turned, strict=True) if is_turned)
 
 
 EFFECT = Payload()

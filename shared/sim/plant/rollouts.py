@@ -155,11 +155,11 @@ class Rollouts:
         for row in rows:
             qpos[row.index, self._qpos] = row.initial_q
             qvel[row.index, self._dofs] = row.initial_qd
-        if any(row.weights for row in rows):
+        if any(row.forces for row in rows):
             forces = self._batch.bind("xfrc_applied")
             for row in rows:
-                for body, weight in row.weights.items():
-                    forces[row.index].reshape(-1, 6)[body, 2] = -weight
+                for body, force in row.forces.items():
+                    forces[row.index].reshape(-1, 6)[body, :3] = force
         if any(row.rests for row in rows):
             self._settle(rows)
         timestep = self.plant.timestep
@@ -382,7 +382,7 @@ def _motion_of(row: Row, recorded: Recorded) -> Hashable:
         tuple((id(law), values.tobytes()) for law, values in (*row.laws, *row.frictions)),
         None if row.encoders is None else row.encoders.scale.tobytes(),
         None if row.encoders is None else row.encoders.offset.tobytes(),
-        tuple(sorted(row.weights.items())),
+        tuple(sorted(row.forces.items())),
         frozenset(row.rests.items()),
         frozenset(row.speeds.items()),
     )

@@ -156,8 +156,11 @@ class Row:
     encoders: Encoders | None = None
     """What a pose controller knows the arm by; None where they are right, and their joints all
     there are."""
-    weights: dict[int, float] = dataclasses.field(default_factory=dict[int, float])
-    """Weight (N) by body, of what nothing balances on an arm that is weightless otherwise."""
+    forces: dict[int, tuple[float, float, float]] = dataclasses.field(
+        default_factory=dict[int, tuple[float, float, float]]
+    )
+    """What pulls at the centre of mass of a body besides (N, in the world): weight that nothing
+    balances on an arm that is weightless otherwise, or that is balanced the wrong way."""
     fields: dict[str, Float64] = dataclasses.field(default_factory=dict[str, Float64])
 
     @property

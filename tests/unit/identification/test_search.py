@@ -13,7 +13,10 @@ import pytest
 
 from shared.identification.catalogue.command_latency import EFFECT as LATE
 from shared.identification.catalogue.counterbalance import EFFECT as BALANCE
+from shared.identification.catalogue.encoder_offset import EFFECT as ZERO
 from shared.identification.catalogue.gravity_tilt import EFFECT as TILT
+from shared.identification.catalogue.payload import EFFECT as PAYLOAD
+from shared.identification.catalogue.payload import OFF_CENTRE
 from shared.identification.catalogue.sample_and_hold import EFFECT as TURNS
 from shared.identification.catalogue.torque_bias import EFFECT as BIAS
 from shared.identification.catalogue.torque_gain import EFFECT as GAIN
@@ -147,6 +150,18 @@ def test_a_tilt_that_is_not_told_from_a_torque_is_its_rival_though_it_has_more_n
     assert _simplest([tilt, torque], np.random.default_rng(0)) == (torque, (tilt,))
     surely = replace(tilt, losses=_GOOD + 0.05)
     assert _simplest([surely, torque], np.random.default_rng(0)) == (torque, ())
+
+
+def test_a_payload_beside_the_centre_and_an_encoders_zero_are_rivals_if_a_little_apart(
+    searches: Searches,
+):
+    zero = searches.tried(Candidate(ZERO, "elbow"), _BAD, _GOOD)
+    apart = 0.01 * float((_BAD - _GOOD).mean())
+    heavy = searches.tried(Candidate(PAYLOAD, OFF_CENTRE), _BAD, _GOOD + apart, numbers=4)
+    heavy = replace(heavy, fit=replace(heavy.fit, cost=zero.fit.cost))
+    assert _simplest([heavy, zero], np.random.default_rng(0)) == (zero, (heavy,))
+    further = replace(heavy, losses=_GOOD + 5.0 * apart)
+    assert _simplest([further, zero], np.random.default_rng(0)) == (zero, ())
 
 
 def test_of_causes_that_are_followed_the_best_is_told_without_what_the_base_could_do(

@@ -1,14 +1,24 @@
 """Effects of the whole arm, and of what it stands on, by hand on an arm of three hinges."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from shared.identification.catalogue import base_compliance, gravity_tilt, payload
+from shared.identification.catalogue import (
+    base_compliance,
+    gravity_tilt,
+    inertia_error,
+    payload,
+)
 from shared.identification.effect import Effect
 from shared.identification.subject import Subject
-from tests.arms import make_plant, make_subject, recorded, replay
+from shared.sim.hidden.arms import ARMS
+from shared.sim.plant.plant import mjcf
+from shared.sim.plant.rollouts import Rollouts
+from shared.sim.plant.row import Row
+from tests.arms import JOINTS, make_plant, make_subject, recorded, replay, write_arm
 
 EFFECTS: tuple[Effect, ...] = (gravity_tilt.EFFECT, base_compliance.EFFECT, payload.EFFECT)
 
@@ -82,6 +92,63 @@ def test_a_base_that_gives_lets_the_tool_sag_by_hand(subject: Subject):
     pitch = 2.0 * np.arcsin(found.tracker[-1, 5])
     turned = pitch - found.q[-1, 1] - found.q[-1, 2]
     assert turned == pytest.approx(4.66 * compliance, rel=0.01, abs=1e-10)
+
+
+@pytest.fixture(scope="module")
+def carried(tmp_path_factory: pytest.TempPathFactory) -> Subject:
+    """An arm of which the controller carries the links' weight."""
+    path = write_arm(tmp_path_factory.mktemp("carried"))
+    is_carried = r'<body name="\1" gravcomp="1"'
+    path.write_text(re.sub('<body name="(upper|fore)"', is_carried, path.read_text()))
+    return make_subject(mjcf(path, "position", JOINTS, JOINTS, "tool"))
+
+
+def test_what_a_controller_does_not_know_of_pulls_though_it_carries_the_arm(carried: Subject):
+    still = recorded([0.0, 0.0, 0.0], seconds=3.0)
+    plain = replay(carried, still)
+    assert np.abs(plain.q[-1]).max() < 1e-4
+    found = replay(carried, still, payload.EFFECT, "", [0.5])
+    # 0.5 kg at the forearm's centre, 0.55 m from the lift, held by 200 N m/rad but for friction
+    assert found.q[-1, 1] * 200 == pytest.approx(0.5 * 9.81 * 0.55, abs=0.12)
+    assert payload.EFFECT.places(carried) == ("",)
+    heavier = replay(carried, still, inertia_error.EFFECT, "lift", [0.8])
+    assert heavier.q[-1, 1] * 200 == pytest.approx(0.8 * 9.81 * 0.2, abs=0.12)
+
+
+def test_a_controller_that_carries_an_arm_goes_by_a_level_base(carried: Subject):
+    tilt, lever = 0.1, 1.0 * 0.2 + 0.5 * 0.55
+    still = recorded([0.0, 0.0, 0.0], seconds=3.0)
+    found = replay(carried, still, gravity_tilt.EFFECT, "", [tilt, 0.0])
+    assert found.q[-1, 0] * 200 == pytest.approx(lever * 9.81 * np.sin(tilt), abs=0.12)
+    assert abs(found.q[-1, 1]) * 200 < 0.15  # 4.66 N m of it, were it not carried
+
+
+def test_a_payload_beside_the_tools_centre_moves_it(subject: Subject):
+    # of the forearm: along x and z; both hinges that move it up turn about y, the pan about z
+    place = payload.OFF_CENTRE
+    assert payload.EFFECT.places(subject) == ("", place)
+    names = [each.name for each in payload.EFFECT.quantities(subject, place)]
+    assert names == ["mass", "centre_x", "centre_y", "centre_z"]
+    still = recorded([0.0, 0.0, 0.0], seconds=3.0)
+    plain = replay(subject, still)
+    found = replay(subject, still, payload.EFFECT, place, [0.5, 0.1, 0.0, 0.0])
+    # 1 kg at 0.25 m from the elbow instead of 0.5 kg at 0.15 m
+    lever = 1.0 * 0.25 - 0.5 * 0.15
+    assert (found.q[-1, 2] - plain.q[-1, 2]) * 200 == pytest.approx(9.81 * lever, rel=0.08)
+
+
+def test_where_the_centre_comes_to_lie_is_the_same_on_a_base_that_gives():
+    """Both joints turn about y, hinges that are added for the base do not."""
+    pendulum = make_subject(ARMS["torque2"].make())
+    bends = Rollouts(pendulum.plant, base_compliance.EFFECT.structure(pendulum, ""), 1)
+
+    def enter(row: Row) -> None:
+        payload.EFFECT.enter(row, payload.OFF_CENTRE, np.array([0.5, 0.1, 0.02]))
+
+    row = bends.entered(enter, recorded([0.0, 0.0], seconds=0.1))
+    tool = row.tool_body()
+    moved = row.field("body_ipos")[tool] - bends.model.body_ipos[tool]
+    np.testing.assert_allclose(moved, [0.1, 0.0, 0.02], atol=1e-12)
 
 
 def test_what_the_data_rule_out_sits_nowhere(tmp_path: Path):
