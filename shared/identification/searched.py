@@ -256,7 +256,8 @@ def judged(found: Search, candidate: Candidate, before: Model, after: Model) -> 
     All recordings make it surer, those that were fitted to with the size that the others give it;
     what nothing was fitted to has to speak for it by more than its standard error all the same.
     So it has to if a cause foretells what stands out there. Of what happened once in a recording
-    that was fitted to nothing is sure, see ``search.py``.
+    that was fitted to nothing is sure, see ``search.py``, nor of what explains that worse than
+    nothing does.
     """
     gain = compare(before.losses, after.losses, found.rng)
     is_foretold = foretells(before.losses, after.losses)
@@ -269,8 +270,8 @@ def judged(found: Search, candidate: Candidate, before: Model, after: Model) -> 
     beyond = gain.gain - gain.error
     surely = max(gain.surely, beyond if is_foretold else min(whole.surely, beyond))
     is_once = candidate.recording is not None
-    if is_once:
-        surely = -np.inf  # there it only frees the base, of whatever it is
+    if is_once or after.fit.cost > before.fit.cost:
+        surely = -np.inf  # it only frees the base, or has bent it
     foretold = None if is_once else _foretold(found, before.fit, after.fit)
     if foretold is not None and foretold.is_refuted:
         surely = -np.inf  # what goes there the base could do as well

@@ -1,15 +1,24 @@
 """What speaks for a cause."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from shared.identification import searched
+from shared.identification.fit import Fit
 from shared.identification.foretold import Foretold
 from shared.identification.searched import Model, foretells, judged
 from tests.searches import ELBOW, Searches
 
 _USUAL = 1.0 + 0.2 * np.sin(np.arange(22.0))
 _EVENT = _USUAL + np.where(np.arange(22) == 7, 10.0, 0.0) + np.where(np.arange(22) == 8, 15.0, 0.0)
+
+
+def _fitted(searches: Searches) -> Fit:
+    """Return a fit that explains what it was fitted to better than the base does."""
+    fit = searches.tried(ELBOW, _USUAL, _USUAL).fit
+    return replace(fit, cost=0.9 * searches.base.cost)
 
 
 @pytest.mark.parametrize(
@@ -30,10 +39,20 @@ def test_an_event_that_a_cause_foretells_makes_it_sure(tmp_path):
     searches = Searches(tmp_path)
     found = searches.search(_EVENT)
     before = Model(searches.base, _EVENT)
-    fit = searches.tried(ELBOW, _EVENT, _USUAL).fit
+    fit = _fitted(searches)
     assert judged(found, ELBOW, before, Model(fit, _USUAL)).gain.is_sure
     some = np.where(np.arange(22) == 8, 7.0, _USUAL)
     assert not judged(found, ELBOW, before, Model(fit, some)).gain.is_sure
+
+
+def test_what_explains_the_recordings_that_were_fitted_to_worse_is_not_sure(tmp_path):
+    searches = Searches(tmp_path)
+    found = searches.search(_USUAL + 2.0)
+    before = Model(searches.base, _USUAL + 2.0)
+    fit = _fitted(searches)
+    assert judged(found, ELBOW, before, Model(fit, _USUAL)).gain.is_sure
+    worse = replace(fit, cost=searches.base.cost + 1.0)
+    assert not judged(found, ELBOW, before, Model(worse, _USUAL)).gain.is_sure
 
 
 @pytest.mark.parametrize(
@@ -57,7 +76,7 @@ def test_a_cause_is_followed_by_what_was_fitted_to_and_what_was_held_out_togethe
     told = Foretold(errors, share, kept, _USUAL + 0.5, _USUAL)
     monkeypatch.setattr(searched, "_foretold", lambda *rest: told)
     monkeypatch.setattr(searched, "sureness", lambda *rest: fitted)
-    fit = searches.tried(ELBOW, _USUAL + 2.0, _USUAL).fit
+    fit = _fitted(searches)
     gain, _, foretold = judged(
         found, ELBOW, Model(searches.base, _USUAL + 2.0), Model(fit, _USUAL)
     )  # fmt: skip
