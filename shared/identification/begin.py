@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from shared.identification.base import INERTIA_PRIOR, base_parameters
+from shared.identification.creep import creep_of, with_creep
 from shared.identification.dataset.types import Dataset
 from shared.identification.effect import Candidate, Effect
 from shared.identification.fit import (
@@ -56,21 +57,24 @@ def begin(
     subject = subject_of(dataset)
     noise = noise_of(dataset, BLOCK, subject.starts, subject.nominal)
     released = known = base_parameters(subject)
-    if fits is not None and not {each.name for each in known} >= set(fits.names):
+    creep = creep_of(subject)
+    if fits is not None and not {each.name for each in (*known, *creep)} >= set(fits.names):
         fits = None
     problem = Problem(subject, dataset, known, noise)
     if not noise.is_measured:
         progress("noise floor", 0.5, "no repeats: from what the base leaves")
         noise = floor_from_base(Space(problem))
     if fits is not None:
-        known = tuple(each for each in known if each.name in fits.names)
+        known = tuple(each for each in (*known, *creep) if each.name in fits.names)
     problem = Problem(subject, dataset, known, noise)
     progress("base fit", 0.0, f"{len(known)} parameters" + ("" if fits is None else ", kept"))
     space = Space(problem)
-    done = fit_base(space, rng) if fits is None else fit_again(space, fits)
+    done = with_creep(fit_base(space, rng), creep) if fits is None else fit_again(space, fits)
+    problem = done.whole.space.problem
     if fits is None and (doubted := _doubted(done.whole)):
         # What is known of a link does not hold, so the base may not bend it: what is wrong there
         # is looked for like any other cause.
+        known = problem.parameters
         progress("base fit", 0.5, f"without {', '.join(known[index].name for index in doubted)}")
         kept = tuple(each for index, each in enumerate(known) if index not in doubted)
         problem = Problem(subject, dataset, kept, noise)

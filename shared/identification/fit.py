@@ -261,6 +261,24 @@ def fit_without(space: Space, done: BaseFits, doubted: Sequence[int]) -> BaseFit
     return BaseFits(nominal, near, replace(whole, starts_agree=done.whole.starts_agree))
 
 
+def fit_with(space: Space, done: BaseFits, start: Float64) -> BaseFits:
+    """Return the base's fit with more parameters, from its best without them.
+
+    Args:
+        space: with them, after those that it had.
+        done: without.
+        start: float64[K], where they begin.
+    """
+    parts, origin = _on_parts(space), np.zeros(space.size)
+    pieces = parts.problem.of("train")
+    nominal = Start(origin, parts.jacobian(origin, pieces)[1])
+    near = polish(parts, np.r_[done.parts.z, start], pieces, 6)
+    is_same = parts.problem is space.problem
+    begun = np.r_[done.whole.z, start]
+    whole = near if is_same else polish(space, begun, space.problem.of("train"), 6)
+    return BaseFits(nominal, near, replace(whole, starts_agree=done.whole.starts_agree))
+
+
 def _start_without(start: Start, gone: Sequence[int]) -> Start:
     """Return the derivative at a vector in which some coordinates are 0, without those."""
     priors = [len(start.jacobian) - start.z.size + index for index in gone]

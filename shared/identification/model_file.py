@@ -15,6 +15,7 @@ import numpy as np
 from shared.errors import IdentificationError
 from shared.identification.base import base_parameters
 from shared.identification.catalogue import effects
+from shared.identification.creep import creep_of
 from shared.identification.dataset.types import Dataset, Float64
 from shared.identification.effect import Effect, Quantity
 from shared.identification.subject import Subject, recorded_of, subject_of
@@ -146,6 +147,8 @@ def _mjcf_file(
         else:
             carried.append(_said(entry, False, _how_to_apply(entry, "model.xml")))
     row = _whole(dataset, subject, verdict, native)
+    if np.any(row.current("dof_frictionloss") > 0.0):
+        row.field("dof_solimp")  # what friction holds is to stick, or creep, as it does in the fit
     path = dataset.source.path
     assert path is not None  # a plant was made of it
     text = patched_xml(subject.plant, path, _structure(native), row.fields)
@@ -184,7 +187,8 @@ def _entered(dataset: Dataset, rollouts: Rollouts, entry: Callable[[Row], None])
 
 
 def _enter_base(row: Row, subject: Subject, verdict: Verdict) -> None:
-    known = {parameter.name: parameter for parameter in base_parameters(subject)}
+    parameters = (*base_parameters(subject), *creep_of(subject))
+    known = {parameter.name: parameter for parameter in parameters}
     for value in verdict.base:
         if value.name not in known:
             raise IdentificationError(f"the verdict fits {value.name!r}, which this arm has not")

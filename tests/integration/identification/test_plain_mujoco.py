@@ -1,0 +1,85 @@
+"""An arm simulated by MuJoCo as its file says, dry friction and all, with other numbers in it.
+
+Friction of MuJoCo's default impedance lets what it holds creep by mrad/s: if the base cannot, that
+is what a cause is named for.
+"""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from shared.identification.dataset.types import Dataset, Float64, ModelSource, Split, Trajectory
+from shared.identification.find import identify
+from shared.identification.model_file import model_file
+
+_JOINTS = ("lift", "elbow")
+_STEP, _PERIOD, _SECONDS = 5e-4, 0.01, 6.0
+_NOISE = 1e-4
+_MOTIONS: dict[str, tuple[Split, str, tuple[float, float]]] = {
+    "slow": ("train", "", (0.5, 0.7)),
+    "again": ("train", "slow", (0.5, 0.7)),
+    "fast": ("train", "", (3.0, 4.3)),
+    "held_out": ("test", "", (1.3, 2.1)),
+}
+
+
+def _mjcf(friction: Float64, damping: Float64, gains: Float64, step: float) -> str:
+    joints = [
+        f'<joint name="{name}" axis="0 1 0" armature="0.02" damping="{damping[index]}" '
+        f'frictionloss="{friction[index]}"/>'
+        for index, name in enumerate(_JOINTS)
+    ]
+    servos = "".join(
+        f'<position name="{name}" joint="{name}" kp="{gains[index]}" kv="1.5"/>'
+        for index, name in enumerate(_JOINTS)
+    )
+    return f"""<mujoco><compiler angle="radian"/>
+      <option timestep="{step}" integrator="implicitfast"/>
+      <worldbody><body>{joints[0]}
+      <geom type="capsule" fromto="0 0 0 0 0 0.25" size="0.03" mass="0.6"/>
+      <body pos="0 0 0.25">{joints[1]}
+      <geom type="capsule" fromto="0 0 0 0.2 0 0" size="0.025" mass="0.4"/>
+      </body></body></worldbody><actuator>{servos}</actuator></mujoco>"""
+
+
+def _recording(name: str, xml: str, rng: np.random.Generator) -> Trajectory:
+    """Return what encoders log at 100 Hz of an arm that stops for a while now and then."""
+    split, repeats, speeds = _MOTIONS[name]
+    at = _PERIOD * np.arange(round(_SECONDS / _PERIOD))
+    moving = np.maximum(np.sin(0.4 * np.pi * at), 0.0)[:, None]
+    command = [-0.3, 0.5] + moving * [0.6, 0.8] * np.sin(at[:, None] * speeds)
+    model = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(model)
+    data.qpos[:] = data.ctrl[:] = command[0]
+    for _ in range(2000):
+        mujoco.mj_step(model, data)
+    q = np.empty_like(command)
+    for row, target in enumerate(command):
+        q[row], data.ctrl[:] = data.qpos, target
+        for _ in range(round(_PERIOD / _STEP)):
+            mujoco.mj_step(model, data)
+    q += _NOISE * rng.standard_normal(q.shape)
+    return Trajectory(name, split, repeats, q[0], np.zeros(2), at, command, at, q)
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_an_arm_that_is_as_its_file_says_has_no_cause(tmp_path: Path, seed: int):
+    rng = np.random.default_rng(seed)
+    friction, damping, gains = np.array([0.15, 0.08]), np.array([0.3, 0.15]), np.array([40.0, 20.0])
+    spread = np.exp(rng.normal(0.0, 0.15, (3, 2)))
+    path = tmp_path / "arm.xml"
+    path.write_text(_mjcf(friction, damping, gains, 0.002))
+    own = _mjcf(friction * spread[0], damping * spread[1], gains * spread[2], _STEP)
+    made = tuple(_recording(name, own, rng) for name in _MOTIONS)
+    source = ModelSource("mjcf", path)
+    dataset = Dataset(tmp_path, source, "position", _JOINTS, _JOINTS, made, (), "")
+    verdict = identify(dataset, seed=seed).verdict
+    assert verdict.verdict == "none"
+    assert verdict.held_out.base_fit < 1.1
+    creep = next(each for each in verdict.base if each.name == "friction_creep")
+    assert creep.base_fit == pytest.approx(1.0 / 9.0, rel=0.2)
+    file = mujoco.MjModel.from_xml_string(model_file(dataset, verdict).text)
+    assert file.dof_solimp[:, 0] == pytest.approx([0.9, 0.9], abs=0.02)
