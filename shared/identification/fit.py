@@ -12,6 +12,7 @@ from shared.identification.dataset.types import Float64
 from shared.identification.noise import Noise
 from shared.identification.problem import Variant
 from shared.identification.space import Space
+from shared.sim.plant.plant import Control
 
 _MAX_STEPS = 12
 _MEDIAN = 0.455
@@ -192,11 +193,22 @@ def floor_from_base(space: Space) -> Noise:
     pieces = parts.problem.of("train")
     fit = polish(parts, np.zeros(space.size), pieces, 4)
     problem, noise = parts.problem, parts.problem.noise
-    found = np.concatenate(problem.residuals([parts.variant(fit.z)], pieces)[0])
-    scale = np.maximum(np.sqrt(np.median(found**2, axis=0) / _MEDIAN), 1.0)
+    each = problem.residuals([parts.variant(fit.z)], pieces)[0]
+    scale = np.maximum(np.sqrt(_usual_power(each, problem.subject.control) / _MEDIAN), 1.0)
     count = len(noise.joints)
     tracker = None if noise.tracker is None else noise.tracker * scale[count:]
     return replace(noise, joints=noise.joints * scale[:count], tracker=tracker)
+
+
+def _usual_power(parts: list[Float64], control: Control) -> Float64:
+    """Return float64[C], the median of squares, block by block where nothing holds the arm.
+
+    Under torques what is usual at the end of a part is many times what is usual at its begin.
+    """
+    if control != "torque":
+        return np.median(np.concatenate(parts) ** 2, axis=0)
+    shortest = min(len(part) for part in parts)
+    return np.median([part[:shortest] ** 2 for part in parts], axis=0).mean(axis=0)
 
 
 @dataclass(frozen=True)

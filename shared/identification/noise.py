@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from shared.identification.dataset.resolution import steps_of
 from shared.identification.dataset.types import Dataset, Float64, Trajectory
+from shared.identification.drift import Drift, drift_of
 from shared.identification.memory import Memory, memory_of
 from shared.identification.parts import CUTS, Cut, spans_of
 from shared.identification.pushed import Pushed, pushed_of, whitening
@@ -51,8 +52,9 @@ class Noise:
     """Where a controller holds the tool alone: what joints differ by otherwise."""
     whitened: Float64 | None = None
     """float64[J], standard deviations of whitened residuals (1)."""
-    memory: Memory | None = None
-    """How much of it is carried on from block to block; None where no repeat says so."""
+    memory: Memory | Drift | None = None
+    """How much of it is carried on from block to block, or how it grows where nothing holds the
+    arm; None where no repeat says so, and nothing else does."""
 
     def floors(self, residuals: Float64, whiten: Float64 | None) -> Float64:
         """Return residuals of joints in noise floors.
@@ -71,6 +73,22 @@ class Noise:
         All of it where nothing is known of what noise carries on, see :class:`Memory`.
         """
         return residuals if self.memory is None else self.memory.news(residuals)
+
+    def growing(self, drift: Drift, blocks: int) -> "Noise":
+        """Return the same of an arm that nothing holds.
+
+        Args:
+            drift: how noise grows, in these noise floors.
+            blocks: of a part; over so many its mean square becomes 1.
+        """
+        size = np.sqrt(np.mean(drift.spread(blocks) ** 2, axis=0))
+        count = len(self.joints)
+        return replace(
+            self,
+            joints=self.joints * size[:count],
+            tracker=None if self.tracker is None else self.tracker * size[count:],
+            memory=drift.scaled(size),
+        )
 
     def whitening(self, nominal: Rollouts, q: Float64) -> Float64 | None:
         """Return what :meth:`floors` needs of an arm at postures float64[B, J]; None for most."""
@@ -143,13 +161,13 @@ def noise_of(
         correlation = np.r_[correlation, found.correlation[len(whitened) :]]
         found = replace(unit, whitened=whitened, correlation=correlation)
         hidden = np.zeros(len(whitened))
-    return replace(found, memory=_memory(found, pairs, nominal, hidden))
+    return _remembered(found, pairs, nominal, hidden)
 
 
-def _memory(
+def _remembered(
     noise: Noise, pairs: Sequence[Difference], nominal: Rollouts | None, rounding: Float64
-) -> Memory:
-    """Return how much of the noise is carried on.
+) -> Noise:
+    """Return the noise with how much of it is carried on, or how it grows.
 
     Args:
         noise: its floor.
@@ -165,10 +183,17 @@ def _memory(
         if noise.tracker is None or each.tracker is None or each.tracker_parts is None:
             continue
         tracker += _split(each.tracker / noise.tracker, each.tracker_parts)
+    no_steps = np.zeros(0 if noise.tracker is None else len(noise.tracker))
+    if nominal is not None and nominal.plant.control == "torque":
+        drift = drift_of(joints, _OF_PAIR, rounding)
+        seen = drift_of(tracker, _OF_PAIR, no_steps) if tracker else None
+        if drift is not None and (noise.tracker is None or seen is not None):
+            blocks = max(len(each) for each in joints)
+            return noise.growing(drift if seen is None else drift.beside(seen), blocks)
     found = memory_of(joints, _OF_PAIR, rounding)
-    if noise.tracker is None:
-        return found
-    return found.beside(memory_of(tracker, _OF_PAIR, np.zeros(len(noise.tracker))))
+    if noise.tracker is not None:
+        found = found.beside(memory_of(tracker, _OF_PAIR, no_steps))
+    return replace(noise, memory=found)
 
 
 def _split(values: Float64, parts: Integers) -> list[Float64]:

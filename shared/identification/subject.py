@@ -8,6 +8,7 @@ import numpy as np
 
 from shared.errors import IdentificationError
 from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource, Trajectory
+from shared.identification.known_efforts import known_effort_of
 from shared.identification.motion import motion_of
 from shared.identification.parts import CUTS, tracker_of
 from shared.identification.ripples import ripples_of
@@ -109,12 +110,17 @@ def subject_of(dataset: Dataset, capacity: int = 128) -> Subject:
     q = np.concatenate([each.q for each in dataset.trajectories])
     motions = [motion_of(each) for each in dataset.trajectories]
     speeds = np.concatenate([each.qd for each in motions])
-    drives = np.concatenate(
-        [
-            inverse_dynamics(plant, nominal.model, each.q, each.qd, each.qdd)
-            for each in (motion.sparse(_SPARSE) for motion in motions)
-        ]
-    )
+    drives = [
+        np.concatenate(
+            [
+                inverse_dynamics(plant, nominal.model, each.q, each.qd, each.qdd)
+                for each in (motion.sparse(_SPARSE) for motion in motions)
+            ]
+        )
+    ]
+    known = [known_effort_of(nominal, each, each.joints_at) for each in dataset.trajectories]
+    if all(each is not None for each in known):  # friction that the model lacks is in them
+        drives.append(np.concatenate([each for each in known if each is not None]))
     return Subject(
         plant=plant,
         nominal=nominal,
@@ -125,7 +131,7 @@ def subject_of(dataset: Dataset, capacity: int = 128) -> Subject:
         travel=np.ptp(q, axis=0),
         lowest=q.min(axis=0),
         speed=np.quantile(np.abs(speeds), 0.98, axis=0),
-        drive=np.quantile(np.abs(drives), 0.98, axis=0),
+        drive=np.max([np.quantile(np.abs(each), 0.98, axis=0) for each in drives], axis=0),
         recordings=dataset.trajectories,
     )
 

@@ -8,12 +8,13 @@ import pytest
 
 from shared.identification.base import base_parameters, enter_base
 from shared.identification.cmaes import minimize
-from shared.identification.dataset.types import Dataset
+from shared.identification.dataset.types import Dataset, ModelSource, Trajectory
 from shared.identification.fit import (
     BaseFits,
     Fit,
     Start,
     _from_elsewhere,  # pyright: ignore[reportPrivateUsage]
+    _usual_power,  # pyright: ignore[reportPrivateUsage]
     fit_without,
     polish,
 )
@@ -21,6 +22,7 @@ from shared.identification.noise import Noise
 from shared.identification.problem import Problem
 from shared.identification.space import Space
 from shared.identification.subject import recorded_of, subject_of
+from tests.arms import JOINTS, write_arm
 from tests.measured import measure, problem_of
 
 PLANTED = {
@@ -113,3 +115,27 @@ def test_what_is_taken_out_of_a_base_is_taken_out_of_the_derivative_at_the_nomin
     assert found.nominal.jacobian == pytest.approx(wanted)
     assert found.nominal.z == pytest.approx(np.zeros(space.size))
     assert found.whole.cost > whole.cost
+
+
+def test_without_repeats_a_floor_under_torques_is_what_is_usual_block_by_block():
+    rng = np.random.default_rng(0)
+    growing = np.linspace(0.1, 3.0, 15)[:, None]
+    parts = [growing * rng.standard_normal((15, 2)) for _ in range(400)]
+    parts[7] *= 50.0  # something happened
+    of_torques = _usual_power(parts, "torque") / 0.455
+    assert of_torques == pytest.approx(np.full(2, np.mean(growing**2)), rel=0.1)
+    assert (_usual_power(parts, "position") / 0.455 < 0.8 * np.mean(growing**2)).all()
+
+
+def test_an_arm_under_torques_is_driven_by_what_was_commanded_friction_and_all(tmp_path: Path):
+    path = write_arm(tmp_path, "torque")
+    at = np.arange(0.0, 1.0, 0.01)
+    still = np.zeros((len(at), 3))
+    command = still + np.array([7.0, 0.0, 0.0])  # N m, and it does not move
+    made = Trajectory("rubs", "train", "", np.zeros(3), np.zeros(3), at, command, at, still)
+    source = ModelSource("mjcf", path, tracked="tool")
+    dataset = Dataset(tmp_path, source, "torque", JOINTS, JOINTS, (made,), (), "")
+    assert subject_of(dataset).drive[0] == pytest.approx(7.0)
+    effort = still + np.array([9.0, 0.0, 0.0])
+    logged = replace(dataset, trajectories=(replace(made, effort=effort),))
+    assert subject_of(logged).drive[0] == pytest.approx(9.0)
