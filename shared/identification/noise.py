@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from shared.identification.dataset.caveats import difference
 from shared.identification.dataset.resolution import steps_of
 from shared.identification.dataset.types import Dataset, Float64, Trajectory
 from shared.identification.drift import Drift, drift_of
@@ -32,6 +33,8 @@ _FEWEST = 10
 """Readings that two recordings have to share, else the last of the shorter one is held."""
 _OF_PAIR = np.sqrt(0.5)
 """Of what two recordings differ by, that is the noise of one."""
+_SAME = 1e-3
+"""Share of their movement by which commands differ that are the same but for rounding."""
 _ROUND = np.sqrt(12.0)
 """A step, in standard deviations of what rounding to it does."""
 
@@ -161,12 +164,23 @@ def noise_of(
         correlation = np.r_[correlation, found.correlation[len(whitened) :]]
         found = replace(unit, whitened=whitened, correlation=correlation)
         hidden = np.zeros(len(whitened))
-    return _remembered(found, pairs, nominal, hidden)
+    return _remembered(found, pairs, nominal, hidden, _answers(dataset))
+
+
+def _answers(dataset: Dataset) -> bool:
+    """Return whether commands answer what happens: given twice, they are not quite the same."""
+    by_name = {each.name: each for each in dataset.trajectories}
+    return any(
+        difference(by_name[each.repeats], each) > _SAME
+        for each in dataset.trajectories
+        if each.repeats
+    )
 
 
 def _remembered(
-    noise: Noise, pairs: Sequence[Difference], nominal: Rollouts | None, rounding: Float64
-) -> Noise:
+    noise: Noise, pairs: Sequence[Difference], nominal: Rollouts | None, rounding: Float64,
+    answers: bool,
+) -> Noise:  # fmt: skip
     """Return the noise with how much of it is carried on, or how it grows.
 
     Args:
@@ -174,6 +188,7 @@ def _remembered(
         pairs: what repeats differ by.
         nominal: the arm; None for one that is held by its joints.
         rounding: float64[J], what an encoder's steps hide, in noise floors.
+        answers: whether commands answer the noise; what is new goes with them then.
     """
     joints: list[Float64] = []
     tracker: list[Float64] = []
@@ -189,7 +204,8 @@ def _remembered(
         seen = drift_of(tracker, _OF_PAIR, no_steps) if tracker else None
         if drift is not None and (noise.tracker is None or seen is not None):
             blocks = max(len(each) for each in joints)
-            return noise.growing(drift if seen is None else drift.beside(seen), blocks)
+            grown = noise.growing(drift if seen is None else drift.beside(seen), blocks)
+            return replace(grown, memory=None) if answers else grown
     found = memory_of(joints, _OF_PAIR, rounding)
     if noise.tracker is not None:
         found = found.beside(memory_of(tracker, _OF_PAIR, no_steps))

@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 
 from shared.identification.dataset.types import Dataset, Float64, ModelSource, Trajectory
+from shared.identification.drift import Drift
+from shared.identification.hidden.generator import simulated
+from shared.identification.hidden.recipe import Recipe
 from shared.identification.noise import block_means, noise_of
+from shared.identification.problem import BLOCK
+from shared.identification.subject import subject_of
 
 AT = 0.02 * np.arange(400.0)
 """A reading a block, 8 s."""
@@ -113,3 +118,25 @@ def test_a_floor_is_never_under_what_an_encoders_steps_hide():
     assert noise_of(swung, 0.02, {}).joints.max() < 0.01  # the sine that was added has no steps
     still = replace(swung, trajectories=tuple(replace(each, q=held) for each in swung.trajectories))
     assert noise_of(still, 0.02, {}).joints == pytest.approx(0.01 / np.sqrt(12.0))
+
+
+def test_noise_grows_under_torques_and_is_not_whitened_where_commands_answer_it():
+    dataset, _ = simulated(Recipe(arm="torque2", seconds=6.0, train=2, test=1, seed=5))
+    subject = subject_of(dataset)
+    open_loop = noise_of(dataset, BLOCK, subject.starts, subject.nominal)
+    assert isinstance(open_loop.memory, Drift)
+    grown = open_loop.memory.spread(15)
+    assert np.mean(grown**2, axis=0) == pytest.approx(np.ones(grown.shape[1]), rel=0.2)
+    rng = np.random.default_rng(0)
+    answered = tuple(
+        replace(each, command=each.command + 0.02 * rng.standard_normal(each.command.shape))
+        if each.repeats
+        else each
+        for each in dataset.trajectories
+    )
+    closed = replace(dataset, trajectories=answered)
+    subject = subject_of(closed)
+    noise = noise_of(closed, BLOCK, subject.starts, subject.nominal)
+    assert noise.is_measured
+    assert noise.memory is None
+    assert noise.joints == pytest.approx(open_loop.joints, rel=1.0)
