@@ -229,7 +229,7 @@ def _centres(subject: Subject, label: str, body: int) -> list[BaseParameter]:
     Along an axis that every hinge before it turns about it is not felt.
     """
     model = subject.nominal.model
-    is_turned = turned_axes(subject.plant, model, body)
+    is_turned = turned_axes(model, body)
     return [
         BaseParameter(
             name=f"centre_{word} {label}",

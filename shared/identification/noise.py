@@ -164,7 +164,7 @@ def noise_of(
         correlation = np.r_[correlation, found.correlation[len(whitened) :]]
         found = replace(unit, whitened=whitened, correlation=correlation)
         hidden = np.zeros(len(whitened))
-    return _remembered(found, pairs, nominal, hidden, _answers(dataset))
+    return _remembered(found, pairs, nominal, hidden, dataset)
 
 
 def _answers(dataset: Dataset) -> bool:
@@ -179,7 +179,7 @@ def _answers(dataset: Dataset) -> bool:
 
 def _remembered(
     noise: Noise, pairs: Sequence[Difference], nominal: Rollouts | None, rounding: Float64,
-    answers: bool,
+    dataset: Dataset,
 ) -> Noise:  # fmt: skip
     """Return the noise with how much of it is carried on, or how it grows.
 
@@ -188,7 +188,7 @@ def _remembered(
         pairs: what repeats differ by.
         nominal: the arm; None for one that is held by its joints.
         rounding: float64[J], what an encoder's steps hide, in noise floors.
-        answers: whether commands answer the noise; what is new goes with them then.
+        dataset: the recordings.
     """
     joints: list[Float64] = []
     tracker: list[Float64] = []
@@ -205,7 +205,8 @@ def _remembered(
         if drift is not None and (noise.tracker is None or seen is not None):
             blocks = max(len(each) for each in joints)
             grown = noise.growing(drift if seen is None else drift.beside(seen), blocks)
-            return replace(grown, memory=None) if answers else grown
+            # Where commands answer the noise, what is new goes with them.
+            return replace(grown, memory=None) if _answers(dataset) else grown
     found = memory_of(joints, _OF_PAIR, rounding)
     if noise.tracker is not None:
         found = found.beside(memory_of(tracker, _OF_PAIR, no_steps))

@@ -1,5 +1,6 @@
 """The tool carries more, or less, than the model says."""
 
+import functools
 from typing import Final
 
 import numpy as np
@@ -8,9 +9,9 @@ from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
 from shared.identification.subject import Subject
 from shared.sim.plant.kinematics import turned_axes
-from shared.sim.plant.plant import is_weightless
+from shared.sim.plant.plant import Plant, is_weightless
 from shared.sim.plant.row import Row
-from shared.sim.plant.structure import Structure
+from shared.sim.plant.structure import Structure, compiled
 
 _GRAVITY = 9.81
 """m/s^2."""
@@ -60,8 +61,7 @@ class Payload:
         if row.model.body_gravcomp[body]:
             row.field("body_gravcomp")[body] /= grown
         if place == OFF_CENTRE:
-            turned = np.array(turned_axes(row.plant, row.model, body))
-            row.field("body_ipos")[body, turned] += values[1:]
+            row.field("body_ipos")[body, np.array(_turned(row.plant))] += values[1:]
 
 
 def _hangs(subject: Subject) -> bool:
@@ -73,9 +73,15 @@ def _hangs(subject: Subject) -> bool:
 
 def _axes(subject: Subject) -> str:
     """Return along which axes of the tool's body its joints feel where it is heavy."""
-    model = subject.nominal.model
-    turned = turned_axes(subject.plant, model, int(model.body(subject.plant.tool_body).id))
+    turned = _turned(subject.plant)
     return "".join(axis for axis, is_turned in zip("xyz", turned, strict=True) if is_turned)
+
+
+@functools.lru_cache(maxsize=8)
+def _turned(plant: Plant) -> tuple[bool, ...]:
+    """Return the same for x, y and z, whatever is added to the arm; every simulated one asks."""
+    model = compiled(plant, ())
+    return tuple(turned_axes(model, int(model.body(plant.tool_body).id)))
 
 
 EFFECT = Payload()

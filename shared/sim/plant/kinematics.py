@@ -50,20 +50,13 @@ def tool_motion(plant: Plant, model: mujoco.MjModel, q: Float64) -> tuple[Float6
     return seen, np.concatenate(parts, axis=2).swapaxes(1, 2)
 
 
-def turned_axes(plant: Plant, model: mujoco.MjModel, body: int) -> list[bool]:
-    """Return for x, y and z of a body whether a hinge that moves it turns about another line.
-
-    Args:
-        plant: the arm; hinges that something added to it do not count.
-        model: of it.
-        body: which.
-    """
+def turned_axes(model: mujoco.MjModel, body: int) -> list[bool]:
+    """Return for x, y and z of a body whether a hinge that moves it turns about another line."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    joints = [int(model.joint(name).id) for name in plant.joints]
     hinges = [
         joint
-        for joint in joints
+        for joint in range(model.njnt)
         if model.jnt_type[joint] == _HINGE and _carries(model, int(model.jnt_bodyid[joint]), body)
     ]
     along = np.abs(data.xaxis[hinges] @ data.xmat[body].reshape(3, 3))
