@@ -39,7 +39,7 @@ interval over seeds. A load beside the number of cores says whether the machine 
 | Date | Benchmark | Figure of the goal | Against the limit | Also | Machine | Command | Commit |
 |---|---|---|---|---|---|---|---|
 """
-PACKAGES = ("mujoco", "numpy", "torch", "rsl-rl-lib", "eclipse-zenoh")
+PACKAGES = ("mujoco", "mujoco-warp", "numpy", "torch", "rsl-rl-lib", "eclipse-zenoh")
 """Whose versions stand in a row."""
 
 

@@ -6,10 +6,12 @@ own, and its position three controls. The torque is the same; what differs from 
 rounding (``tests/integration/sim/test_warp.py`` holds the two side by side, step by step).
 
 Policies, observation and judging stay where they are, on the processor: what crosses for each
-control step is 14 numbers a world one way and 68 the other.
+control step is 14 numbers a world one way and 68 the other, through memory that the card reaches by
+itself. What is launched for a step is recorded once and then launched whole.
 """
 
 import importlib
+from collections.abc import Callable
 from typing import Any, Final
 
 import mujoco
@@ -27,6 +29,10 @@ _TOOL: Final = 13
 """Where the tool's pose begins among an agent's sensors."""
 _KEPT: Final = ("qpos", "qvel", "qacc_warmstart")
 """What a continuation needs of a world."""
+_SEEN: Final = ("sensordata", "qpos", "qvel")
+"""What the processor works with after each step."""
+_CONTACTS_OF_A_PAIR: Final = 4
+"""More than two capsules can have."""
 
 
 class WarpBatch:
@@ -59,12 +65,15 @@ class WarpBatch:
         data = mujoco.MjData(mj)
         data.qpos[:] = model.en_garde.ravel()
         mujoco.mj_forward(mj, data)
+        contacts, rows = _most(mj)
         with self._warp.ScopedDevice(self._device):
             self._m = self._mjw.put_model(mj)
-            self._d = self._mjw.put_data(mj, data, nworld=num_envs)
-            self._site_quats = np.tile(mj.site_quat.astype(np.float32), (num_envs, 1, 1))
-            self._m.site_quat = self._warp.array(self._site_quats, dtype=self._warp.quat)
-        self._controls = np.zeros((num_envs, mj.nu), np.float32)
+            self._d = self._mjw.put_data(mj, data, nworld=num_envs, nconmax=contacts, njmax=rows)
+            quats = np.tile(mj.site_quat.astype(np.float32), (num_envs, 1, 1))
+            self._m.site_quat = self._warp.array(quats, dtype=self._warp.quat)
+        self._controls = _Mirror(self._warp, self._d.ctrl)
+        self._site_quats = _Mirror(self._warp, self._m.site_quat)
+        self._seen = {name: _Mirror(self._warp, getattr(self._d, name)) for name in _SEEN}
         self.sensors: Float64 = np.empty((num_envs, len(AGENTS) * SENSORS))
         self.qpos: Float64 = np.empty((num_envs, mj.nq))
         self.qvel: Float64 = np.empty((num_envs, mj.nv))
@@ -75,8 +84,8 @@ class WarpBatch:
             self._path = CommandPath(
                 model.parameters.command, num_envs, len(AGENTS), cfg.control_timestep, cfg.substeps
             )
-        self._has_stepped = False
-        self._graph: Any = None
+        self._advance = _Launches(self._warp, self._device, self._physics)
+        self._make_current = _Launches(self._warp, self._device, self._kinematics)
         self.reset(np.arange(num_envs), np.tile(model.en_garde.ravel(), (num_envs, 1)))
 
     def step(self) -> None:
@@ -88,7 +97,7 @@ class WarpBatch:
         for substep in range(self.model.cfg.substeps):
             if self._path is not None:
                 self._command(self._path.advance(substep))
-            self._physics_step()
+            self._advance()
         self._look()
 
     def reset(self, ids: Int64, qpos: Float64) -> None:
@@ -150,10 +159,10 @@ class WarpBatch:
         self._look()
 
     def check(self) -> None:
-        """Make sure that every world is still finite.
+        """Make sure that every world is still finite, and that none had more contacts than fit.
 
         Raises:
-            SimulationError: if a world diverged; names it.
+            SimulationError: if one is not; names it.
         """
         broken = np.flatnonzero(~np.isfinite(self.qpos).all(1) | ~np.isfinite(self.qvel).all(1))
         if len(broken):
@@ -161,46 +170,101 @@ class WarpBatch:
                 f"{len(broken)} of {self.num_envs} worlds on {self._device} hold values that are "
                 f"not finite, world {broken[0]} first"
             )
+        kinds = self._mjw.OverflowType
+        lost = kinds.NEFC | kinds.BROADPHASE | kinds.NARROWPHASE | kinds.CCD
+        full = np.flatnonzero(self._d.overflow.numpy() & int(lost))
+        if len(full):
+            raise SimulationError(
+                f"{len(full)} of {self.num_envs} worlds on {self._device} had more contacts than "
+                f"there is room for, world {full[0]} first: some were left out"
+            )
 
     def _command(self, ctrl: Float64) -> None:
         """Bring float64[N, 14] to the device: positions as controls, orientations as sites."""
         poses = ctrl.reshape(self.num_envs, len(AGENTS), CONTROLS)
-        self._controls[:, self._moves] = poses[:, :, :3].reshape(self.num_envs, -1)
+        self._warp.synchronize_device(self._device)  # it may still read what the last one was
+        self._controls.here[:, self._moves] = poses[:, :, :3].reshape(self.num_envs, -1)
         quats = poses[:, :, 3:]
-        self._site_quats[:, self._goals] = quats / np.linalg.norm(quats, axis=2, keepdims=True)
-        self._d.ctrl.assign(self._controls)
-        self._m.site_quat.assign(self._site_quats)
+        norms = np.linalg.norm(quats, axis=2, keepdims=True)
+        self._site_quats.here[:, self._goals] = quats / norms
+        self._controls.send()
+        self._site_quats.send()
 
-    def _physics_step(self) -> None:
-        """Step; on a card as one captured graph, which spares the launch of each kernel."""
-        with self._warp.ScopedDevice(self._device):
-            if not self._warp.get_device(self._device).is_cuda:
-                self._mjw.step(self._m, self._d)
-                return
-            if not self._has_stepped:  # loads every kernel, which no capture may
-                self._has_stepped = True
-                self._mjw.step(self._m, self._d)
-                return
-            if self._graph is None:  # a capture records, and runs nothing
-                with self._warp.ScopedCapture() as capture:
-                    self._mjw.step(self._m, self._d)
-                self._graph = capture.graph
-            self._warp.capture_launch(self._graph)
+    def _physics(self) -> None:
+        self._mjw.step(self._m, self._d)
+
+    def _kinematics(self) -> None:
+        """Make current what sensors read of positions and velocities, and no more than that."""
+        self._mjw.kinematics(self._m, self._d)
+        self._mjw.com_pos(self._m, self._d)
+        self._mjw.sensor_pos(self._m, self._d)
+        self._mjw.com_vel(self._m, self._d)
+        self._mjw.sensor_vel(self._m, self._d)
 
     def _look(self) -> None:
         """Make every sensor current, and copy what the processor works with."""
-        with self._warp.ScopedDevice(self._device):
-            self._mjw.fwd_position(self._m, self._d)
-            self._mjw.sensor_pos(self._m, self._d)
-            self._mjw.fwd_velocity(self._m, self._d)
-            self._mjw.sensor_vel(self._m, self._d)
-        self.sensors[:] = self._d.sensordata.numpy()[:, : self.sensors.shape[1]]
-        self.qpos[:] = self._d.qpos.numpy()
-        self.qvel[:] = self._d.qvel.numpy()
+        self._make_current()
+        for mirror in self._seen.values():
+            mirror.fetch()
+        self._warp.synchronize_device(self._device)
+        self.sensors[:] = self._seen["sensordata"].here[:, : self.sensors.shape[1]]
+        self.qpos[:] = self._seen["qpos"].here
+        self.qvel[:] = self._seen["qvel"].here
 
     def _write(self, values: dict[str, NDArray[np.float32]]) -> None:
         for name, value in values.items():
             getattr(self._d, name).assign(np.ascontiguousarray(value, np.float32))
+
+
+class _Mirror:
+    """An array of the device and its copy here, in memory that a card reads and writes itself."""
+
+    def __init__(self, warp: Any, there: Any) -> None:
+        self._warp, self._there = warp, there
+        self._host = warp.empty_like(there, device="cpu", pinned=there.device.is_cuda)
+        warp.copy(self._host, there)
+        warp.synchronize_device(there.device)
+        self.here: NDArray[np.float32] = self._host.numpy()
+        """The copy; what is written into it is sent, and must stay until the device had it."""
+
+    def send(self) -> None:
+        """Put what is here in the queue of what goes to the device."""
+        self._warp.copy(self._there, self._host)
+
+    def fetch(self) -> None:
+        """Put what is there in the queue of what comes from it."""
+        self._warp.copy(self._host, self._there)
+
+
+class _Launches:
+    """Kernels launched in the same order each time: on a card, one graph instead of each."""
+
+    def __init__(self, warp: Any, device: str, launch: Callable[[], None]) -> None:
+        self._warp, self._device, self._launch = warp, device, launch
+        self._is_card = bool(warp.get_device(device).is_cuda)
+        self._has_run = False
+        self._graph: Any = None
+
+    def __call__(self) -> None:
+        """Launch them; the first time plainly: that loads kernels, which no recording may."""
+        with self._warp.ScopedDevice(self._device):
+            if not (self._is_card and self._has_run):
+                self._launch()
+                self._has_run = True
+                return
+            if self._graph is None:  # recording launches nothing
+                with self._warp.ScopedCapture() as capture:
+                    self._launch()
+                self._graph = capture.graph
+            self._warp.capture_launch(self._graph)
+
+
+def _most(mj: mujoco.MjModel) -> tuple[int, int]:
+    """Return the most contacts, and rows of constraints, that a world can have."""
+    contacts = _CONTACTS_OF_A_PAIR * mj.npair
+    dry, limited = int((mj.dof_frictionloss > 0).sum()), int(mj.jnt_limited.sum())
+    of_a_contact = int(2 * (mj.pair_dim.max(initial=1) - 1))  # of a pyramid
+    return max(contacts, 1), max(dry + limited + contacts * of_a_contact, 1)
 
 
 def _without_orientation_actuators(model: FencingModel) -> mujoco.MjModel:
@@ -213,7 +277,7 @@ def _without_orientation_actuators(model: FencingModel) -> mujoco.MjModel:
 def _libraries() -> tuple[Any, Any]:
     try:
         warp: Any = importlib.import_module("warp")
-        warp.config.quiet = True
+        warp.config.log_level = warp.LOG_WARNING
         return warp, importlib.import_module("mujoco_warp")
     except ImportError as error:
         raise ConfigError(
