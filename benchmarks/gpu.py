@@ -9,6 +9,7 @@ them. Where there is no card it says so and measures nothing.
 
 import importlib.util
 import os
+import sys
 import time
 from collections.abc import Callable
 from typing import Final
@@ -22,7 +23,7 @@ from benchmarks.rollouts import rollout_of
 from benchmarks.throughput import a_rollout
 from benchmarks.training_run import ENDLESS, training_run
 from services.actor.collector import Collector
-from services.jobs.bench import Check, Measurement, NotHereError
+from services.jobs.bench import Check, Measurement, NotHereError, figure
 from services.jobs.settings import Settings
 from services.league.config import LeagueConfig
 from shared.game.reward import RewardConfig
@@ -93,7 +94,7 @@ class Actor:
 
 
 def update_seconds(settings: Settings, device: str, samples: int) -> float:
-    """Return the seconds of one PPO update of so many samples (the median of three)."""
+    """Return the seconds of one PPO update of so many samples, the first one left out."""
     from services.learner.ppo import PolicyOptimiser
 
     cfg = msgspec.structs.replace(settings.learner, device=device, batch_samples=samples)
@@ -101,12 +102,9 @@ def update_seconds(settings: Settings, device: str, samples: int) -> float:
     one = a_rollout()
     rollouts = [one] * (samples // one.rewards.size)
     optimiser.update(rollouts)
-    times: list[float] = []
-    for _ in range(3):
-        begin = time.perf_counter()
-        optimiser.update(rollouts)  # ends with figures on the processor, so nothing is left to do
-        times.append(time.perf_counter() - begin)
-    return float(np.median(times))
+    begin = time.perf_counter()
+    optimiser.update(rollouts)  # ends with figures on the processor, so nothing is left to do
+    return time.perf_counter() - begin
 
 
 def run_on_card(seconds: float) -> float:
@@ -175,14 +173,11 @@ def measure(smoke: bool) -> Measurement:
     for samples in UPDATES:
         for device in ("cpu", "cuda"):
             sides[f"PPO update of {samples}, {device}"] = _update(settings, device, samples)
-    turns = interleaved(rounds, list(sides.values()))
     window = seconds if smoke else RUN_SECONDS
-    trained = interleaved(rounds, [lambda: run_on_card(window), lambda: run_on_cores(window)])
-    seen = [
-        dict(zip(sides, turn, strict=True))
-        | {"training run, card": one, "training run, all cores": other}
-        for turn, (one, other) in zip(turns, trained, strict=True)
-    ]
+    sides["training run, card"] = lambda: run_on_card(window)
+    sides["training run, all cores"] = lambda: run_on_cores(window)
+    turns = interleaved(rounds, [_told(name, side) for name, side in sides.items()])
+    seen = [dict(zip(sides, turn, strict=True)) for turn in turns]
     best = max(sizes, key=lambda size: median(seen, f"card, {size} worlds"))
     runs = tuple(run | {"ratio": run[f"card, {best} worlds"] / run["one core"]} for run in seen)
     return Measurement(
@@ -198,6 +193,17 @@ def measure(smoke: bool) -> Measurement:
             for name in seen[0]
         ),
     )
+
+
+def _told(name: str, side: Callable[[], float]) -> Callable[[], float]:
+    """Return a side that says what it measured: all of it takes minutes."""
+
+    def measured() -> float:
+        value = side()
+        print(f"{name}: {figure(value)}", file=sys.stderr, flush=True)
+        return value
+
+    return measured
 
 
 def _physics_on_card(model: FencingModel, size: int, seconds: float) -> Callable[[], float]:

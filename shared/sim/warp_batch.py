@@ -55,13 +55,11 @@ class WarpBatch:
         """
         if num_envs < 1:
             raise ValueError(f"num_envs ({num_envs}) must be at least 1")
-        self._warp, self._mjw = _libraries()
+        self._warp, self._mjw, self._kernels = _libraries()
         self._device = _device_of(self._warp, device)
         self.model = model
         self.num_envs = num_envs
         mj = _without_orientation_actuators(model)
-        self._goals = [mj.site(f"{agent}/goal").id for agent in AGENTS]
-        self._moves = [mj.actuator(f"{agent}/{axis}").id for agent in AGENTS for axis in "xyz"]
         data = mujoco.MjData(mj)
         data.qpos[:] = model.en_garde.ravel()
         mujoco.mj_forward(mj, data)
@@ -71,8 +69,14 @@ class WarpBatch:
             self._d = self._mjw.put_data(mj, data, nworld=num_envs, nconmax=contacts, njmax=rows)
             quats = np.tile(mj.site_quat.astype(np.float32), (num_envs, 1, 1))
             self._m.site_quat = self._warp.array(quats, dtype=self._warp.quat)
-        self._controls = _Mirror(self._warp, self._d.ctrl)
-        self._site_quats = _Mirror(self._warp, self._m.site_quat)
+            self._goals = self._warp.array(
+                [mj.site(f"{agent}/goal").id for agent in AGENTS], dtype=int
+            )
+            self._moves = self._warp.array(
+                [mj.actuator(f"{agent}/{axis}").id for agent in AGENTS for axis in "xyz"], dtype=int
+            )
+            poses = self._warp.empty((num_envs, len(AGENTS) * CONTROLS), dtype=float)
+        self._commands = _Mirror(self._warp, poses)
         self._seen = {name: _Mirror(self._warp, getattr(self._d, name)) for name in _SEEN}
         self.sensors: Float64 = np.empty((num_envs, len(AGENTS) * SENSORS))
         self.qpos: Float64 = np.empty((num_envs, mj.nq))
@@ -180,17 +184,19 @@ class WarpBatch:
             )
 
     def _command(self, ctrl: Float64) -> None:
-        """Bring float64[N, 14] to the device: positions as controls, orientations as sites."""
-        poses = ctrl.reshape(self.num_envs, len(AGENTS), CONTROLS)
+        """Bring float64[N, 14] to the device."""
         self._warp.synchronize_device(self._device)  # it may still read what the last one was
-        self._controls.here[:, self._moves] = poses[:, :, :3].reshape(self.num_envs, -1)
-        quats = poses[:, :, 3:]
-        norms = np.linalg.norm(quats, axis=2, keepdims=True)
-        self._site_quats.here[:, self._goals] = quats / norms
-        self._controls.send()
-        self._site_quats.send()
+        self._commands.here[:] = ctrl
+        self._commands.send()
 
     def _physics(self) -> None:
+        """Take what was sent as controls and goals, and step."""
+        self._warp.launch(
+            self._kernels.take_commands,
+            dim=(self.num_envs, len(AGENTS)),
+            inputs=[self._commands.there, self._moves, self._goals],
+            outputs=[self._d.ctrl, self._m.site_quat],
+        )
         self._mjw.step(self._m, self._d)
 
     def _kinematics(self) -> None:
@@ -220,7 +226,7 @@ class _Mirror:
     """An array of the device and its copy here, in memory that a card reads and writes itself."""
 
     def __init__(self, warp: Any, there: Any) -> None:
-        self._warp, self._there = warp, there
+        self._warp, self.there = warp, there
         self._host = warp.empty_like(there, device="cpu", pinned=there.device.is_cuda)
         warp.copy(self._host, there)
         warp.synchronize_device(there.device)
@@ -229,11 +235,11 @@ class _Mirror:
 
     def send(self) -> None:
         """Put what is here in the queue of what goes to the device."""
-        self._warp.copy(self._there, self._host)
+        self._warp.copy(self.there, self._host)
 
     def fetch(self) -> None:
         """Put what is there in the queue of what comes from it."""
-        self._warp.copy(self._host, self._there)
+        self._warp.copy(self._host, self.there)
 
 
 class _Launches:
@@ -274,11 +280,13 @@ def _without_orientation_actuators(model: FencingModel) -> mujoco.MjModel:
     return mj
 
 
-def _libraries() -> tuple[Any, Any]:
+def _libraries() -> tuple[Any, Any, Any]:
+    """Return warp, mujoco_warp and our kernels."""
     try:
         warp: Any = importlib.import_module("warp")
         warp.config.log_level = warp.LOG_WARNING
-        return warp, importlib.import_module("mujoco_warp")
+        mjw = importlib.import_module("mujoco_warp")
+        return warp, mjw, importlib.import_module("shared.sim.warp_kernels")
     except ImportError as error:
         raise ConfigError(
             f"the back end 'warp' needs mujoco_warp ({error}): pip install 'riposte[gpu]'"
