@@ -7,6 +7,8 @@ bus, from whatever machine.
 import sys
 from collections.abc import Sequence
 
+import structlog
+
 from services.actor import joining
 from services.actor.config import ActorConfig
 from services.actor.service import Actor
@@ -23,12 +25,16 @@ from shared.sim.env import FencingEnv
 from shared.sim.model import FencingModel
 from shared.sim.worlds import worlds_of
 
+log = structlog.get_logger()
+
 
 def build(args: ServeArgs, bus: Bus, clock: Clock) -> Actor:
     """Return the actor that the command line asks for."""
     cfg = args.section("actor", ActorConfig)
     action = args.section("action", ActionConfig)
     model = FencingModel.build(args.section("sim", SimConfig))
+    if cfg.backend == "warp":
+        log.info("loading_kernels", hint="compiled the first time on a machine: about a minute")
     worlds = worlds_of(cfg.backend, model, cfg.num_envs, cfg.device)
     env = FencingEnv(model, args.section("game", RuleBook), action, cfg.num_envs, worlds=worlds)
     fit = Fit.of(action, model.cfg.control_timestep, model.hash)

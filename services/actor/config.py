@@ -2,6 +2,7 @@
 
 import msgspec
 
+from shared.messages.training import MOST_WORLDS
 from shared.sim.worlds import Backend
 
 
@@ -32,8 +33,8 @@ class ActorConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         for name in ("num_envs", "rollout_steps", "opponent_cache", "frame_steps"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} ({getattr(self, name)}) must be at least 1")
-        if self.num_envs > 4096:
-            raise ValueError(f"num_envs ({self.num_envs}) must be at most 4096")
+        if self.num_envs > MOST_WORLDS:
+            raise ValueError(f"num_envs ({self.num_envs}) must be at most {MOST_WORLDS}")
         for name in ("ask_timeout", "acknowledge_timeout"):
             if getattr(self, name) <= 0.0:
                 raise ValueError(f"{name} ({getattr(self, name)} s) must be positive")

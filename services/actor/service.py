@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from services.actor.collector import Collector, Results, Segment
 from services.actor.config import ActorConfig
+from services.actor.cutting import cut, parts_of
 from services.actor.evaluation import Evaluation
 from services.actor.frames import WORLD, FrameSampler
 from services.actor.leasing import LeaseKeeper
@@ -80,6 +81,8 @@ class Actor:
         self._reports = Reports(bus, clock, cfg.ask_timeout, env.model.hash)
         self._policies = LearningPolicies(bus, fit)
         self._frames = FrameSampler(env, clock, cfg.frame_period, cfg.frame_steps)
+        self._parts = parts_of(cfg.rollout_steps, cfg.num_envs)
+        """Rollouts that what is played at a time goes out as."""
         self._keeper = LeaseKeeper(bus, clock, cfg.num_envs, cfg.rollout_steps, cfg.ask_timeout)
         self._playing = ""
         """Name of the lease that collector or evaluation belong to."""
@@ -240,8 +243,8 @@ class Actor:
 
     def _collect(self, lease: Lease, stage: Stage, collector: Collector) -> bool:
         outbox = self._rollouts[stage.agent]
-        outbox.window = lease.window
-        if outbox.full:
+        outbox.window = lease.window * self._parts
+        if outbox.unacknowledged > outbox.window - self._parts:
             self._wait_for(
                 f"learner {stage.agent}: {outbox.unacknowledged} rollouts unacknowledged"
             )
@@ -250,8 +253,9 @@ class Actor:
         assert learning is not None  # the lease was not started without one
         segment = collector.collect(learning.policy, self._frames.on_step)
         self._count_steps(self._cfg.rollout_steps)
-        outbox.put(self._rollout(lease, stage, learning, segment))
-        self._rollout_sequence += 1
+        for part in cut(segment, self._parts):
+            outbox.put(self._rollout(lease, stage, learning, part))
+            self._rollout_sequence += 1
         own = f"sha256:{learning.digest}"
         pair = (own, stage.opponent) if stage.agent == "antagonist" else (stage.opponent, own)
         self._show(lease, int(segment.bouts[WORLD]), pair)
@@ -284,6 +288,7 @@ class Actor:
             log_probs=segment.log_probs,
             rewards=segment.rewards,
             truncated=segment.truncated,
+            worlds=self.num_envs,
         )
 
     def _report(self, lease: Lease, results: Results, players: tuple[str, str]) -> None:

@@ -10,7 +10,7 @@ from services.learner.played import Played
 from shared.bus.ranges import LARGEST
 from shared.messages.league import LeaseSummary, Stage
 from shared.messages.texts import LONGEST_NAME
-from shared.messages.training import ACTION_DIM, Agent, Rollout
+from shared.messages.training import ACTION_DIM, MOST_WORLDS, Agent, Rollout
 
 _LOG_PROB_TOLERANCE = 1e-2
 _STD_RANGE = (1e-4, 100.0)
@@ -116,6 +116,8 @@ def check_contents(rollout: Rollout, bout_steps: int) -> Ruling:
     steps, worlds = rollout.rewards.shape
     if steps == 0 or worlds == 0:
         return _drop(f"empty: {steps} steps of {worlds} bouts")
+    if not 0 <= rollout.worlds <= MOST_WORLDS:
+        return _drop(f"{rollout.worlds} bouts side by side; at most {MOST_WORLDS} are")
     if len(np.unique(rollout.bouts)) != worlds or rollout.bouts.min() < 0:
         return _drop("a bout stands in two worlds, or has a negative number")
     last = rollout.first_step.astype(np.int64) + steps

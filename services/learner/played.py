@@ -42,7 +42,7 @@ class Played:
         for bout, first in zip(rollout.bouts.tolist(), rollout.first_step.tolist(), strict=True):
             self._steps.setdefault(bout, Ranges()).cover(first, first + steps - 1)
         self._newest = max(self._newest, int(rollout.bouts.max()))
-        floor = self._newest + 1 - KEPT_BOUTS * len(rollout.bouts)
+        floor = self._newest + 1 - KEPT_BOUTS * max(rollout.worlds, len(rollout.bouts))
         if floor > self._floor:
             self._floor = floor
             for bout in [bout for bout in self._steps if bout < floor]:

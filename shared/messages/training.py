@@ -11,6 +11,8 @@ OBS_DIM = 27
 """Own bat pose and velocity (13), other bat pose and velocity (13), time (1)."""
 ACTION_DIM = 6
 """Offset of the tool: translation (3) and rotation (3), each in units of its bound."""
+MOST_WORLDS = 4096
+"""Bouts that one actor may play side by side."""
 
 
 class Rollout(Message, frozen=True, kw_only=True):
@@ -58,6 +60,9 @@ class Rollout(Message, frozen=True, kw_only=True):
     rewards: Annotated[Array, ArraySpec("float32", ("T", "N"))]
     truncated: Annotated[Array, ArraySpec("bool", ("N",))]
     """The bout in this world reached its time limit with the last row."""
+    worlds: int = 0
+    """Bouts that the actor plays side by side: more than N where they go out as several rollouts; 0
+    where these are all."""
 
     @property
     def name(self) -> str:

@@ -219,6 +219,26 @@ def test_it_plays_no_more_than_its_window_until_it_is_answered(hall: Hall):
     assert hall.actor.health().counters["rollouts_acknowledged"] == 1
 
 
+def test_what_is_too_long_for_one_message_goes_out_in_parts_each_of_some_worlds(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    monkeypatch.setattr("services.actor.service.parts_of", lambda steps, worlds: 3)
+    hall = Hall()
+    hall.train()
+    rollouts = [rollout for rollout, _ in hall.arrived]
+    assert [rollout.sequence for rollout in rollouts] == list(range(12))  # a window of 4, 3 each
+    assert [len(rollout.bouts) for rollout in rollouts] == [3, 2, 3] * 4
+    assert {rollout.worlds for rollout in rollouts} == {WORLDS}
+    for rollout in rollouts:
+        assert check_contents(rollout, BOUT_STEPS).decision is Decision.LEARN
+    bouts = np.concatenate([rollout.bouts for rollout in rollouts[:3]])
+    np.testing.assert_array_equal(bouts, np.arange(WORLDS))
+    (first, request), *_ = hall.arrived
+    request.reply(Receipt(accepted=True))
+    hall.tick(3)
+    assert len(hall.arrived) == 12, first.name  # two parts under way leave no room for three
+
+
 def test_a_dropped_rollout_is_counted_and_play_goes_on(hall: Hall):
     hall.train(window=1)
     hall.acknowledge(accepted=False, reason="stale: version 0, now 4, oldest 3")

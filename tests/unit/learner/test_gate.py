@@ -199,6 +199,13 @@ def played(rollouts: int, worlds: int, steps: int = 8) -> Iterator[Rollout]:
             bouts[world], first[world], following = following, 0, following + 1
 
 
+@pytest.mark.parametrize("worlds", [-1, 5000])
+def test_nobody_plays_that_many_bouts_side_by_side(worlds: int):
+    ruling = check_contents(msgspec.structs.replace(rollout(), worlds=worlds), BOUT_STEPS)
+    assert ruling.decision is Decision.DROP
+    assert ruling.reason == f"{worlds} bouts side by side; at most 4096 are"
+
+
 def test_what_was_handed_over_before_is_not_new_whatever_part_of_it():
     one = rollout(worlds=8)
     before = Played()
@@ -211,14 +218,24 @@ def test_what_was_handed_over_before_is_not_new_whatever_part_of_it():
     assert check_new(following, before).decision is Decision.LEARN
 
 
-@pytest.mark.parametrize("worlds", [8, 96])
+def some_worlds(whole: Rollout, parts: int) -> Iterator[Rollout]:
+    """The bouts and steps of a rollout, as so many rollouts of some of its worlds each."""
+    for ids in np.array_split(np.arange(len(whole.bouts)), parts):
+        yield msgspec.structs.replace(
+            whole, bouts=whole.bouts[ids], first_step=whole.first_step[ids],
+            rewards=whole.rewards[:, ids], worlds=len(whole.bouts),
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize(("worlds", "parts"), [(8, 1), (96, 1), (96, 5)])
 @pytest.mark.parametrize("lost", [0.0, 0.4])
 def test_a_lease_that_lives_for_days_takes_no_more_memory_and_loses_nothing(
-    worlds: int, lost: float
+    worlds: int, parts: int, lost: float
 ):
     before, dice = Played(), np.random.default_rng(3)
     late: list[Rollout] = []
-    for number, each in enumerate(played(400, worlds)):
+    pieces = (piece for whole in played(400, worlds) for piece in some_worlds(whole, parts))
+    for number, each in enumerate(pieces):
         if dice.random() < lost:  # dropped as stale, never handed over again; or a little late
             late = [*late, each][-6:] if number % 2 else late
             continue
