@@ -108,6 +108,21 @@ def loose_parameters(
     return tuple(found)
 
 
+def bends(parameters: tuple[BaseParameter, ...], x: Float64) -> Float64:
+    """Return float64[n], how many standard deviations from what is known of its link each is.
+
+    Args:
+        parameters: of a base; of what is no link's it is 0.
+        x: their coordinates, float64[n or more].
+    """
+    return np.array(
+        [
+            coordinate / each.prior if each.prior == INERTIA_PRIOR else 0.0
+            for each, coordinate in zip(parameters, x, strict=False)
+        ]
+    )
+
+
 def enter_base(parameters: tuple[BaseParameter, ...], x: Float64, row: Row) -> None:
     """Put the base model at coordinates into one arm: float64[n]."""
     for parameter, coordinate in zip(parameters, x, strict=True):

@@ -1,10 +1,11 @@
 """Begins a search: what the noise is, and the base fitted without any cause."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from shared.identification.base import INERTIA_PRIOR, base_parameters
+from shared.identification.base import base_parameters, bends
 from shared.identification.creep import creep_of, with_creep
 from shared.identification.dataset.types import Dataset
 from shared.identification.effect import Candidate, Effect
@@ -71,7 +72,7 @@ def begin(
     space = Space(problem)
     done = with_creep(fit_base(space, rng), creep) if fits is None else fit_again(space, fits)
     problem = done.whole.space.problem
-    if fits is None and (doubted := _doubted(done.whole)):
+    if fits is None and (doubted := doubted_of(done.whole)):
         # What is known of a link does not hold, so the base may not bend it: what is wrong there
         # is looked for like any other cause.
         known = problem.parameters
@@ -126,10 +127,28 @@ def begun_with(
     )
 
 
-def _doubted(fit: Fit) -> list[int]:
+def begin_without(found: Search, gone: Sequence[int], *, seed: int) -> Search:
+    """Return a search that has just begun, as another one whose base may not bend so much.
+
+    Args:
+        found: the other one, just begun.
+        gone: which of its base's parameters stay as the model file has them.
+        seed: of everything random.
+    """
+    known = found.problem.parameters
+    kept = tuple(each for index, each in enumerate(known) if index not in gone)
+    space = Space(replace(found.problem, parameters=kept))
+    done = fit_without(space, BaseFits(found.nominal, found.parts, found.base), gone)
+    return begun_with(
+        done,
+        seed=seed,
+        candidates=found.candidates,
+        ruled_out=found.ruled_out,
+        doubted=(*found.doubted, *(known[index].name for index in gone)),
+    )
+
+
+def doubted_of(fit: Fit) -> list[int]:
     """Return which parameters a fit bends further than what is known of them allows."""
-    return [
-        index
-        for index, (each, z) in enumerate(zip(fit.space.problem.parameters, fit.z, strict=True))
-        if each.prior == INERTIA_PRIOR and abs(z) > FAR_FROM_KNOWN * INERTIA_PRIOR
-    ]
+    off = np.abs(bends(fit.space.problem.parameters, fit.z))
+    return [int(index) for index in np.flatnonzero(off > FAR_FROM_KNOWN)]

@@ -78,7 +78,7 @@ def otherwise(found: Search, progress: Progress) -> Otherwise | None:
         fit = _along(space, np.r_[each.shift, each.start])
         losses = stretches(problem, space.variant(fit.z), test)
         is_sure = is_there(fit, each.candidate, train)
-        if is_sure and _brings_back(base, fit) and not _is_worse(losses, found.base_losses):
+        if is_sure and _brings_back(base, fit) and not is_worse(losses, found.base_losses):
             gain = compare(found.base_losses, losses, np.random.default_rng(0))
             tried.append(Tried(each, fit, gain, losses))
     if not tried:
@@ -162,7 +162,7 @@ def _brings_back(base: Fit, fit: Fit) -> bool:
     return set(_far(fit)) < set(_far(base)) and base.cost - fit.cost > _SLIGHT
 
 
-def _is_worse(losses: Float64, than: Float64) -> bool:
+def is_worse(losses: Float64, than: Float64) -> bool:
     """Return whether the held-out recordings prefer the other one, by more than chance and a bit.
 
     Where both leave hardly more than noise, one of six that do as well is off by chance alone.

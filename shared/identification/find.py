@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from shared.identification.again import fresh, leave_out
-from shared.identification.begin import begin
-from shared.identification.bent import far_from_file, otherwise, worse_than_file
+from shared.identification.begin import begin, begin_without, doubted_of
+from shared.identification.bent import far_from_file, is_worse, otherwise, worse_than_file
 from shared.identification.catalogue import effects
 from shared.identification.conclude import Conclusion, conclude, extended
 from shared.identification.dataset.caveats import in_words
@@ -86,6 +86,20 @@ def identify(
         clock.over("search")
         left = _left(found, [each for each in left if each.is_external])
         clock.over("unexplained")
+    if not is_open(found) and (gone := doubted_of(found.current)):
+        # A payload on the last link is that link, heavier: only what is known of links tells them
+        # apart, and what they would have to be with all that was named says what to believe.
+        bent = ", ".join(found.problem.parameters[index].name for index in gone)
+        progress("screen", 0.0, f"again, without {bent}")
+        other = begin_without(untouched, gone, seed=seed)
+        search(other, progress)
+        if (
+            other.accepted
+            and not is_open(other)
+            and not is_worse(other.current_losses, found.current_losses)
+        ):
+            found, left = other, _left(other)
+        clock.over("search")
     fit_to_all(found, left)
     if not found.accepted and not is_open(found):
         found.otherwise = otherwise(found, progress)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from shared.identification.base import bends
 from shared.identification.certainty import is_there
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
@@ -53,6 +54,8 @@ _NEARLY = 0.05
 """Of the cost on what was fitted to: by so much two causes that hardly differ may be apart."""
 _APART = 0.5
 """Cosine of what two causes explain, up to which three quarters of it are not the same."""
+_BENT = 15.0
+"""By so much more, as part of the cost, no cause may have links bent than one that does as well."""
 _LOADS = {"counterbalance", "torque_bias", "gravity_tilt", "joint_spring"}
 """Causes of which none is told from the others by a few postures: near one of them a load that
 depends on posture is a constant torque, whatever numbers either has."""
@@ -252,14 +255,17 @@ def _simplest(useful: list[Tried], rng: np.random.Generator) -> tuple[Tried, tup
     which something large happened has no more of a say than ``_EVENT`` usual ones. Where hardly
     more than noise is left, it is what the base could not make up for of what was held out; where
     much is, that would be most of what tells one large cause from another. Of what does as well as
-    the best one, the simplest is taken; what needs more numbers to do no better is no rival, unless
-    it is in the nature of both that they are hardly told apart.
+    the best one, and has links bent no further for it, the simplest is taken; what needs more
+    numbers to do no better is no rival, unless it is in the nature of both that they are hardly
+    told apart.
     """
     is_apart = all(one.gain.apart is not None and one.gain.before < NEARLY_NOISE for one in useful)
     most = _EVENT * min(float(np.median(one.everywhere(is_apart))) for one in useful)
     left = {one.candidate: np.minimum(one.everywhere(is_apart), most) for one in useful}
     best = min(useful, key=lambda one: left[one.candidate].mean())
     alike = [one for one in useful if one is best or _is_alike(best, one, left, rng)]
+    bent = {one.candidate: _bent_by(one.fit) for one in alike}
+    alike = [one for one in alike if bent[one.candidate] - min(bent.values()) <= _BENT]
     fewest = min(one.numbers for one in alike)
     simple = [one for one in alike if one.numbers == fewest]
     taken = min(simple, key=lambda one: left[one.candidate].mean())
@@ -268,6 +274,11 @@ def _simplest(useful: list[Tried], rng: np.random.Generator) -> tuple[Tried, tup
     return taken, tuple(
         one for one in others if one.candidate in as_simple or _is_nearly(taken, one, is_apart, rng)
     )
+
+
+def _bent_by(fit: Fit) -> float:
+    """Return what speaks against the links of a fit's base, as part of the cost."""
+    return 0.5 * float(np.sum(bends(fit.space.problem.parameters, fit.z) ** 2))
 
 
 def _is_nearly(taken: Tried, other: Tried, is_apart: bool, rng: np.random.Generator) -> bool:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shared.identification.base import base_parameters, enter_base, loose_parameters
+from shared.identification.base import base_parameters, bends, enter_base, loose_parameters
 from shared.identification.catalogue.joint_elasticity import EFFECT as ELASTICITY
 from shared.identification.subject import Subject
 from shared.sim.hidden.arms import ARMS
@@ -35,6 +35,14 @@ def test_nought_is_nominal_and_one_a_factor_e_or_the_scale(subject: Subject):
         expected = np.e * each.nominal if each.is_factor else each.nominal + each.scale
         assert each.value(1.0) == pytest.approx(expected)
         assert each.value(each.low) >= 0.0
+
+
+def test_links_bend_by_standard_deviations_and_nothing_else_does(subject: Subject):
+    parameters = base_parameters(subject)
+    x = np.full(len(parameters) + 2, 0.25)  # two of causes, after those of the base
+    found = dict(zip([each.name for each in parameters], bends(parameters, x), strict=True))
+    assert {name for name, bend in found.items() if bend} == {f"mass {joint}" for joint in JOINTS}
+    assert found["mass elbow"] == pytest.approx(2.5)
 
 
 def test_frictions_bounds_are_none_at_all_and_far_more_than_the_file_says(subject: Subject):

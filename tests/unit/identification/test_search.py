@@ -55,6 +55,20 @@ def test_of_causes_that_do_as_well_the_one_of_fewer_numbers_is_taken(searches: S
     assert rivals == ()
 
 
+@pytest.mark.parametrize(("bend", "is_taken"), [(0.2, True), (0.6, False)])
+def test_what_does_as_well_by_bending_links_further_is_not_taken_however_simple(
+    searches: Searches, bend: float, is_taken: bool
+):
+    best = searches.tried(DRAG, _BAD, _GOOD, numbers=3)
+    simple = searches.tried(ELBOW, _BAD, _GOOD)
+    names = [each.name for each in searches.problem.parameters]
+    z = simple.fit.z.copy()
+    z[names.index("mass elbow")] = bend  # 2 or 6 standard deviations: 2 or 18 of the cost
+    bent = replace(simple, fit=replace(simple.fit, z=z))
+    taken, _ = _simplest([best, bent], np.random.default_rng(0))
+    assert taken is (bent if is_taken else best)
+
+
 def test_causes_of_as_many_numbers_that_do_as_well_are_rivals(searches: Searches):
     one = searches.tried(ELBOW, _BAD, _GOOD + 0.01)
     other = searches.tried(LIFT, _BAD, _GOOD)
