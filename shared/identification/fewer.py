@@ -1,4 +1,4 @@
-"""Takes back causes that others make superfluous."""
+"""Takes back causes that others make superfluous, and says anew what is not told from them."""
 
 from dataclasses import replace
 
@@ -58,6 +58,39 @@ def _take_back(found: Search, each: Tried, without: Model) -> None:
     found.current, found.current_losses = without
     if not found.accepted:
         found.current, found.current_losses = found.base, found.base_losses
+
+
+def tell_apart(found: Search, train: tuple[int, ...], test: tuple[int, ...]) -> None:
+    """Ask of what was not told from a cause once more, beside all that was found after it.
+
+    Where most of what is wrong is still to be found, many a cause stands for some of it.
+    """
+    for index, taken in enumerate(found.accepted[:-1]):
+        others: list[Tried] = []
+        for each in found.rivals[index]:
+            fit = _instead(found, {taken.candidate}, each, train)
+            others.append(
+                replace(each, fit=fit, losses=stretches(found.problem, fit.variant, test))
+            )
+        if not others:
+            continue
+        now = replace(taken, fit=found.current, losses=found.current_losses)
+        best = min((now, *others), key=lambda one: one.losses.mean())
+        if best is not now and compare(now.losses, best.losses, found.rng).surely > 0.0:
+            found.accepted[index] = best
+            found.current, found.current_losses = best.fit, best.losses
+        else:
+            best = now
+        found.rivals[index] = tuple(
+            one for one in (now, *others) if one is not best and _is_alike(found, best, one)
+        )
+
+
+def _is_alike(found: Search, best: Tried, other: Tried) -> bool:
+    """Return whether held-out recordings do not prefer one of two surely, all else found."""
+    margin = compare(other.losses, best.losses, found.rng)
+    whole = compare(found.base_losses, best.losses, found.rng)
+    return margin.gain < max(margin.error, ALIKE * whole.gain)
 
 
 def one_for_many(found: Search, train: tuple[int, ...], test: tuple[int, ...]) -> None:

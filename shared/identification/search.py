@@ -7,7 +7,7 @@ from shared.identification.certainty import is_there
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
 from shared.identification.family import Family, look_elsewhere, relatives
-from shared.identification.fewer import one_for_many, prune
+from shared.identification.fewer import one_for_many, prune, tell_apart
 from shared.identification.fit import Fit, go_down, polish
 from shared.identification.gate import (
     LEAST_SHARE,
@@ -30,6 +30,7 @@ from shared.identification.searched import (
     Search,
     Tried,
     cosine,
+    is_open,
     judged,
     plain_losses_of,
     so_far,
@@ -72,6 +73,7 @@ def search(found: Search, progress: Progress) -> None:
         if is_over or not _round(found, train, test, progress):
             break
     if found.accepted:
+        tell_apart(found, train, test)
         prune(found, train, test)
     if len(found.accepted) > 1:
         one_for_many(found, train, test)
@@ -87,6 +89,11 @@ def _is_over(found: Search) -> bool:
         return _is_quiet(found, so_far(found))
     left, base = float(found.current_losses.mean()), float(found.base_losses.mean())
     return left < LEAST_SHARE * (base - floor_of(base))
+
+
+def _goes_on(found: Search) -> bool:
+    """Return whether so much is left that what is not told apart may be neither."""
+    return is_open(found) if found.problem.noise.is_measured else not _is_over(found)
 
 
 def _is_quiet(found: Search, model: Model) -> bool:
@@ -145,7 +152,7 @@ def _round(
     found.current, found.current_losses = best.fit, best.losses
     if family is not None:
         _join(found, family)
-    if rivals:
+    if rivals and not _goes_on(found):
         return False
     if found.parts.space.problem is found.problem:
         found.parts = found.current

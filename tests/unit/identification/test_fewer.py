@@ -10,11 +10,12 @@ from shared.identification.catalogue.joint_spring import EFFECT as JOINT_SPRING
 from shared.identification.certainty import half_widths, is_there
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
-from shared.identification.fewer import one_for_many, prune
+from shared.identification.fewer import one_for_many, prune, tell_apart
 from shared.identification.fit import polish
+from shared.identification.gate import stretches
 from shared.identification.searched import Search
 from shared.sim.plant.row import Row
-from tests.searches import ELBOW, LIFT, Searches
+from tests.searches import DRAG, ELBOW, LIFT, Searches
 
 SPRING = Candidate(JOINT_SPRING, "elbow")
 
@@ -43,6 +44,43 @@ def test_one_cause_that_does_as_well_is_taken_for_two_of_one_effect(tmp_path: Pa
     assert found.current.space.candidates == (SPRING,)
     assert found.rivals == [()]
     assert found.current_losses.mean() < 1.3
+
+
+def a_tie_and_then_drag(searches: Searches) -> Search:
+    """Return a search that took a torque of the elbow, no better than the lift's, and then drag."""
+    bad, good = np.full(4, 9.0), np.full(4, 5.0)
+    elbow, lift, drag = (searches.tried(each, bad, good) for each in (ELBOW, LIFT, DRAG))
+    found = searches.search(bad, drag, before=(elbow,))
+    found.rivals[0] = (lift,)
+    train, test = found.problem.of("train"), found.problem.of("test")
+    found.current = polish(found.current.space, found.current.z, train, 4)
+    found.current_losses = stretches(found.problem, found.current.variant, test)
+    return found
+
+
+def test_of_what_was_not_told_apart_the_one_is_taken_that_does_better_beside_the_rest(
+    tmp_path: Path,
+):
+    def pull(row: Row) -> None:
+        LIFT.effect.enter(row, LIFT.place, np.array([1.0]))
+        DRAG.effect.enter(row, DRAG.place, np.array([0.5]))
+
+    found = a_tie_and_then_drag(Searches(tmp_path, enter=pull))
+    before = found.current_losses.mean()
+    tell_apart(found, found.problem.of("train"), found.problem.of("test"))
+    assert [each.candidate for each in found.accepted] == [LIFT, DRAG]
+    assert found.rivals == [(), ()]
+    assert set(found.current.space.candidates) == {LIFT, DRAG}
+    assert found.current_losses.mean() < 0.5 * before
+
+
+def test_what_does_as_well_beside_the_rest_is_still_not_told_apart(searches: Searches):
+    found = a_tie_and_then_drag(searches)
+    current = found.current
+    tell_apart(found, found.problem.of("train"), found.problem.of("test"))
+    assert [each.candidate for each in found.accepted] == [ELBOW, DRAG]
+    assert [each.candidate for each in found.rivals[0]] == [LIFT]
+    assert found.current is current
 
 
 def test_two_causes_of_one_effect_that_do_better_stay(searches: Searches):
