@@ -57,18 +57,22 @@ def a_policy(generator: np.random.Generator) -> GaussianPolicy:
     )
 
 
+def a_collector(env: FencingEnv) -> tuple[Collector, GaussianPolicy]:
+    """Return what plays two policies of the default size in some worlds, and the learning one."""
+    generator = np.random.default_rng(0)
+    policy = a_policy(generator)
+    opponent = SnapshotPlayer(a_policy(generator), LeagueConfig().opponent_stochastic)
+    made = Collector(env, 0, opponent, ROLLOUT_STEPS, 1.0, 0.1, RewardConfig(), seed=0)
+    return made, policy
+
+
 class Loop:
     """One actor's worlds, played and played again."""
 
     def __init__(self, num_envs: int, rollouts: int) -> None:
-        generator = np.random.default_rng(0)
         self.model = FencingModel.build(SimConfig())
         self.env = FencingEnv(self.model, RuleBook(), ActionConfig(), num_envs)
-        self.policy = a_policy(generator)
-        opponent = SnapshotPlayer(a_policy(generator), LeagueConfig().opponent_stochastic)
-        self.collector = Collector(
-            self.env, 0, opponent, ROLLOUT_STEPS, 1.0, 0.1, RewardConfig(), seed=0
-        )
+        self.collector, self.policy = a_collector(self.env)
         self.rollouts = rollouts
         self.commands = np.empty((ROLLOUT_STEPS, *self.env.batch.ctrl.shape))
         for _ in range(WARM_UP):

@@ -17,20 +17,16 @@ from typing import Final
 import msgspec
 import numpy as np
 
-from benchmarks.actor import ROLLOUT_STEPS, a_policy
+from benchmarks.actor import ROLLOUT_STEPS, a_collector
 from benchmarks.harness import interleaved, median
 from benchmarks.rollouts import rollout_of
 from benchmarks.throughput import a_rollout
 from benchmarks.training_run import ENDLESS, training_run
-from services.actor.collector import Collector
 from services.jobs.bench import Check, Measurement, NotHereError, figure
 from services.jobs.settings import Settings
-from services.league.config import LeagueConfig
-from shared.game.reward import RewardConfig
 from shared.game.rules import RuleBook
 from shared.messages.wire import encode
 from shared.policy.action import ActionConfig
-from shared.policy.players import SnapshotPlayer
 from shared.sim.batch import FencingBatch
 from shared.sim.env import FencingEnv
 from shared.sim.model import FencingModel
@@ -72,11 +68,8 @@ class Actor:
     """An actor's worlds and its loop, without a bus."""
 
     def __init__(self, model: FencingModel, worlds: Worlds, num_envs: int) -> None:
-        generator = np.random.default_rng(0)
         env = FencingEnv(model, RuleBook(), ActionConfig(), num_envs, worlds=worlds)
-        self._policy = a_policy(generator)
-        opponent = SnapshotPlayer(a_policy(generator), LeagueConfig().opponent_stochastic)
-        self._collector = Collector(env, 0, opponent, ROLLOUT_STEPS, 1.0, 0.1, RewardConfig(), 0)
+        self._collector, self._policy = a_collector(env)
         self._hash = model.hash
         self._samples = ROLLOUT_STEPS * num_envs
 
@@ -97,7 +90,7 @@ def update_seconds(settings: Settings, device: str, samples: int) -> float:
     """Return the seconds of one PPO update of so many samples, the first one left out."""
     from services.learner.ppo import PolicyOptimiser
 
-    cfg = msgspec.structs.replace(settings.learner, device=device, batch_samples=samples)
+    cfg = msgspec.structs.replace(settings.learner, device=device)
     optimiser = PolicyOptimiser(cfg, seed=0)
     one = a_rollout()
     rollouts = [one] * (samples // one.rewards.size)
@@ -107,26 +100,26 @@ def update_seconds(settings: Settings, device: str, samples: int) -> float:
     return time.perf_counter() - begin
 
 
+def trained(words: tuple[str, ...], seconds: float) -> float:
+    """Return training samples a second of a run with these settings over the default ones."""
+    with training_run((*ENDLESS, "train.record=false", *words)) as run:
+        return float(run.window(seconds)["samples_per_s"])
+
+
 def run_on_card(seconds: float) -> float:
     """Return training samples a second of a run with one actor and the learner on the card."""
     words = (
-        *ENDLESS, "train.record=false", "train.actors=1", "actor.backend=warp",
-        f"actor.num_envs={LOOP_WORLDS}", "learner.device=cuda",
-        f"learner.batch_samples={LOOP_WORLDS * ROLLOUT_STEPS}",
+        "train.actors=1", "actor.backend=warp", f"actor.num_envs={LOOP_WORLDS}",
+        "learner.device=cuda", f"learner.batch_samples={LOOP_WORLDS * ROLLOUT_STEPS}",
     )  # fmt: skip
-    with training_run(words) as run:
-        return float(run.window(seconds)["samples_per_s"])
+    return trained(words, seconds)
 
 
 def run_on_cores(seconds: float) -> float:
     """Return training samples a second of a default run that has all of the machine's cores."""
     actors = max(1, (os.cpu_count() or 2) - 2)  # the learner and the router want one each
     batch = max(20480, 5120 * actors)  # as many rollouts an update as there are actors
-    words = (
-        *ENDLESS, "train.record=false", f"train.actors={actors}", f"learner.batch_samples={batch}"
-    )  # fmt: skip
-    with training_run(words) as run:
-        return float(run.window(seconds)["samples_per_s"])
+    return trained((f"train.actors={actors}", f"learner.batch_samples={batch}"), seconds)
 
 
 def why_not() -> str:
@@ -144,7 +137,7 @@ def card_name() -> str:
     """Return what the first card is called."""
     import torch
 
-    return torch.cuda.get_device_name(0) if torch.cuda.is_available() else "no card"
+    return torch.cuda.get_device_name(0)
 
 
 def measure(smoke: bool) -> Measurement:

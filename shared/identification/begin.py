@@ -75,12 +75,10 @@ def begin(
     if fits is None and (doubted := doubted_of(done.whole)):
         # What is known of a link does not hold, so the base may not bend it: what is wrong there
         # is looked for like any other cause.
-        known = problem.parameters
-        progress("base fit", 0.5, f"without {', '.join(known[index].name for index in doubted)}")
-        kept = tuple(each for index, each in enumerate(known) if index not in doubted)
-        problem = Problem(subject, dataset, kept, noise)
-        space = Space(problem)
-        done = fit_without(space, done, doubted)
+        bent = ", ".join(problem.parameters[index].name for index in doubted)
+        progress("base fit", 0.5, f"without {bent}")
+        done = _held(done, doubted)
+        problem = done.whole.space.problem
     candidates, ruled_out = candidates_of(catalogue, subject, without)
     return begun_with(
         done,
@@ -136,16 +134,20 @@ def begin_without(found: Search, gone: Sequence[int], *, seed: int) -> Search:
         seed: of everything random.
     """
     known = found.problem.parameters
-    kept = tuple(each for index, each in enumerate(known) if index not in gone)
-    space = Space(replace(found.problem, parameters=kept))
-    done = fit_without(space, BaseFits(found.nominal, found.parts, found.base), gone)
     return begun_with(
-        done,
+        _held(BaseFits(found.nominal, found.parts, found.base), gone),
         seed=seed,
         candidates=found.candidates,
         ruled_out=found.ruled_out,
         doubted=(*found.doubted, *(known[index].name for index in gone)),
     )
+
+
+def _held(done: BaseFits, gone: Sequence[int]) -> BaseFits:
+    """Return a base's fits with some of its parameters as the model file has them."""
+    problem = done.whole.space.problem
+    kept = tuple(each for index, each in enumerate(problem.parameters) if index not in gone)
+    return fit_without(Space(replace(problem, parameters=kept)), done, gone)
 
 
 def doubted_of(fit: Fit) -> list[int]:

@@ -71,6 +71,9 @@ class Arm:
     """Of the drives."""
 
 
+_FILE: Final = Arm(_ARMATURE, _DAMPING, np.zeros(7))
+
+
 def draw(wrong: Wrong, rng: np.random.Generator) -> tuple[Arm, str]:
     """Return an arm with one thing wrong, of random place and size, and what that is in words."""
     arm = Arm(
@@ -110,8 +113,7 @@ def convert(out: Path, wrong: Wrong, seconds: float = 8.0, seed: int = 0) -> Non
     notes = {
         "source": "simulated", "seed": seed, "wrong": words, "friction": arm.friction.tolist(),
     }  # fmt: skip
-    file = Arm(_ARMATURE, _DAMPING, np.zeros(7))
-    write(out, _mjcf(file, 0.002), "torque", JOINTS, trajectories, notes)
+    write(out, _mjcf(_FILE, 0.002), "torque", JOINTS, trajectories, notes)
 
 
 def _motion(at: Float64, rng: np.random.Generator, fastest: float) -> Float64:
@@ -130,7 +132,7 @@ def _recording(name: str, arm: Arm, seconds: float, rng: np.random.Generator) ->
     speeds = np.gradient(command, _CYCLE, axis=0)
     model = mujoco.MjModel.from_xml_string(_mjcf(arm, _TIMESTEP))
     model.dof_solimp[:] = [0.99, 0.999, 0.001, 0.5, 2.0]  # joints that rub stick
-    known = mujoco.MjModel.from_xml_string(_mjcf(Arm(_ARMATURE, _DAMPING, np.zeros(7)), _TIMESTEP))
+    known = mujoco.MjModel.from_xml_string(_mjcf(_FILE, _TIMESTEP))
     data, weight = mujoco.MjData(model), mujoco.MjData(known)
     data.qpos[:] = command[0]
     rows = round(seconds / _PERIOD)

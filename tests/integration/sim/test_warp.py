@@ -1,5 +1,7 @@
 """mujoco_warp beside MuJoCo, step by step: where there is no graphics card, on its `cpu` device."""
 
+from collections.abc import Iterator
+
 import msgspec
 import mujoco
 import numpy as np
@@ -42,6 +44,20 @@ def commands(batch: FencingBatch, generator: np.random.Generator) -> np.ndarray:
     return wanted.reshape(worlds, -1)
 
 
+def driven(
+    ours: FencingBatch, theirs: Worlds, steps: int, hold: int, generator: np.random.Generator
+) -> Iterator[None]:
+    """Step both by the same commands, new ones every so many steps; stop after each step."""
+    begin = ours.ctrl.copy()
+    for step in range(steps):
+        if step % hold == 0:
+            ours.ctrl[:] = begin
+            theirs.ctrl[:] = ours.ctrl[:] = commands(ours, generator)
+        ours.step()
+        theirs.step()
+        yield
+
+
 def crossed(worlds: Worlds) -> np.ndarray:
     """Return commands at which the blades of one world press against each other."""
     wanted = worlds.ctrl.reshape(2, 7).copy()
@@ -57,13 +73,7 @@ def test_both_simulators_move_alike_where_nothing_touches(model: FencingModel, d
     np.testing.assert_allclose(theirs.sensors, ours.sensors, atol=1e-6)
     generator = np.random.default_rng(3)
     worst = {"position": 0.0, "velocity": 0.0}
-    begin = ours.ctrl.copy()
-    for step in range(200):
-        if step % 20 == 0:
-            ours.ctrl[:] = begin
-            theirs.ctrl[:] = ours.ctrl[:] = commands(ours, generator)
-        ours.step()
-        theirs.step()
+    for _ in driven(ours, theirs, 200, 20, generator):
         bats = np.abs(theirs.sensors - ours.sensors).reshape(WORLDS, 2, 20)
         worst["position"] = max(worst["position"], np.abs(theirs.qpos - ours.qpos).max())
         worst["position"] = max(worst["position"], bats[:, :, :7].max(), bats[:, :, 13:].max())
@@ -141,13 +151,8 @@ def test_a_control_step_of_several_physics_steps_is_the_same(device: str):
     model = FencingModel.of(SimConfig(physics_timestep=0.0025), parameters)
     ours, theirs = FencingBatch(model, WORLDS), worlds_of("warp", model, WORLDS, device)
     generator = np.random.default_rng(5)
-    begin = ours.ctrl.copy()
-    for step in range(60):
-        if step % 10 == 0:
-            ours.ctrl[:] = begin
-            theirs.ctrl[:] = ours.ctrl[:] = commands(ours, generator)
-        ours.step()
-        theirs.step()
+    for _ in driven(ours, theirs, 60, 10, generator):
+        pass
     np.testing.assert_allclose(theirs.qpos, ours.qpos, atol=TOLERANCE["position"])
 
 
