@@ -23,6 +23,9 @@ def record_of(trial: Trial, truth: Truth, verdict: Verdict, cpu_s: float) -> dic
         "named": [_cause(each) for each in verdict.causes],
         "ties": [[_cause(each) for each in tie.causes] for tie in verdict.ties],
         "unexplained": len(verdict.unexplained),
+        "unexplained_most": max(
+            (each.times_noise for each in verdict.unexplained if not each.is_external), default=0.0
+        ),
         "nominal": held.nominal,
         "base_fit": held.base_fit,
         "extended": held.extended,

@@ -23,11 +23,11 @@ def prune(found: Search, train: tuple[int, ...], test: tuple[int, ...]) -> None:
     for each in _doubtful(found.accepted)[::-1]:
         is_told = not found.rivals[found.accepted.index(each)]
         if is_told and not _is_there(found.current, each.candidate, train, test):
-            _take_back(found, each, _without(found, each, train, test))
+            take_back(found, each, without(found, each, train, test))
     for each in _doubtful(found.accepted[:-1]):
-        without = _without(found, each, train, test)
-        if not judged(found, each.candidate, without, so_far(found)).gain.is_useful(base):
-            _take_back(found, each, without)
+        others = without(found, each, train, test)
+        if not judged(found, each.candidate, others, so_far(found)).gain.is_useful(base):
+            take_back(found, each, others)
 
 
 def _is_there(
@@ -44,7 +44,7 @@ def _doubtful(accepted: list[Tried]) -> list[Tried]:
     return [one for one in accepted if not one.is_event and not one.is_relative]
 
 
-def _without(found: Search, each: Tried, train: tuple[int, ...], test: tuple[int, ...]) -> Model:
+def without(found: Search, each: Tried, train: tuple[int, ...], test: tuple[int, ...]) -> Model:
     """Return everything that was accepted but one."""
     kept, z = _apart_from(found, {each.candidate})
     space = Space(found.problem, kept)
@@ -52,10 +52,17 @@ def _without(found: Search, each: Tried, train: tuple[int, ...], test: tuple[int
     return Model(fit, stretches(found.problem, space.variant(fit.z), test))
 
 
-def _take_back(found: Search, each: Tried, without: Model) -> None:
+def take_back(found: Search, each: Tried, others: Model) -> None:
+    """Take back a cause.
+
+    Args:
+        found: the search.
+        each: one that was accepted.
+        others: fitted without it.
+    """
     index = found.accepted.index(each)
     del found.accepted[index], found.rivals[index]
-    found.current, found.current_losses = without
+    found.current, found.current_losses = others
     if not found.accepted:
         found.current, found.current_losses = found.base, found.base_losses
 

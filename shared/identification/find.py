@@ -18,6 +18,7 @@ from shared.identification.effect import Effect
 from shared.identification.evidence import Evidence
 from shared.identification.gathered import evidence_of
 from shared.identification.leftover import leftovers
+from shared.identification.once import is_named, take_back_pushes, take_pushes
 from shared.identification.problem import BLOCK, Variant
 from shared.identification.progress import Progress, silent
 from shared.identification.saved import load, save
@@ -86,6 +87,8 @@ def identify(
         clock.over("search")
         left = _left(found, [each for each in left if each.is_external])
         clock.over("unexplained")
+    left = _pushed_once(found, left)
+    clock.over("unexplained")
     if not is_open(found) and (gone := doubted_of(found.current)):
         # A payload on the last link is that link, heavier: only what is known of links tells them
         # apart, and what they would have to be with all that was named says what to believe.
@@ -109,6 +112,17 @@ def identify(
     conclusion = conclude(found, left)
     clock.over("diagnostics")
     return Finding(_verdict(found, conclusion, left, dataset, seed, clock.seconds), evidence)
+
+
+def _pushed_once(found: Search, left: tuple[Unexplained, ...]) -> tuple[Unexplained, ...]:
+    """Name what pushed once, if no law is missing; return what is left after that."""
+    if take_back_pushes(found, left):
+        left = _left(found, [each for each in left if each.is_external])
+    if is_open(found) or not take_pushes(found, left):
+        return left
+    known = [each for each in left if each.is_external and not is_named(found, each)]
+    left = _left(found, known)
+    return _left(found, known) if take_back_pushes(found, left) else left
 
 
 def _left(found: Search, known: Sequence[Unexplained] = ()) -> tuple[Unexplained, ...]:

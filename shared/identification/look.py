@@ -15,6 +15,7 @@ from shared.identification.progress import Progress
 from shared.identification.refit import Rough, refit, refit_late
 from shared.identification.screen import Screened, Seen, screen
 from shared.identification.turns import LATE
+from shared.identification.windows import closer
 
 _TRIED = 6
 """Candidates that are refitted with the base's derivative kept."""
@@ -58,6 +59,10 @@ def look(
     slight = _slight(fit)
     refitted = [each for each in screened if not is_calm or each.candidate.recording is None]
     picked = [(each, fit) for each in _diverse(refitted, slight) if not is_hopeless(each)]
+    picked = [
+        (closer(fit, each, segments) if each.candidate.recording else each, fit)
+        for each, _ in picked
+    ]
     if is_far:
         progress("screen", 0.5, "again, from the nominal model")
         far = Fit.at(fit.space, np.r_[nominal.z, fit.z[nominal.z.size :]], segments)

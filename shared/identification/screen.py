@@ -62,7 +62,7 @@ class Seen:
     """Of the others, in all parts."""
 
 
-class _Judged(NamedTuple):
+class AtBest(NamedTuple):
     """A candidate at its best, and the look that showed it."""
 
     screened: Screened
@@ -99,8 +99,8 @@ def screen(
         seen: is filled at the first look. At a later one, where hardly more than noise is left,
             candidates that by it would explain least are not looked at, nor returned.
     """
-    picked = segments[::_EVERY] if len(segments) >= _MANY else segments
-    rows = fit.space.problem.rows_of(segments, picked)
+    picked = _picked(segments)
+    rows = shown_rows(fit, segments)
     subject = fit.space.problem.subject
     lasting = [each for each in candidates if each.recording is None]
     steady = [each for each in lasting if _is_steady(subject, each)]
@@ -113,18 +113,18 @@ def screen(
     everywhere = columns_of(fit, looks_of(subject, local), segments)
     if seen is not None and not seen.steady:
         seen.steady, seen.local = columns, everywhere
-    judged = sorted(_judged(part, columns), key=lambda each: -each.screened.share)
+    judged = sorted(at_best(part, columns), key=lambda each: -each.screened.share)
     is_plain = 2.0 * fit.cost > _PLAIN * len(fit.residual)
     count = _CLOSER if len(picked) < len(segments) and not is_plain else 0
     found = [each.screened for each in judged[count:]]
     found += _closer(fit, judged[:count], segments, picked)
-    found += [each.screened for each in _judged(fit, everywhere, rows)]
+    found += [each.screened for each in at_best(fit, everywhere, rows)]
     once = [each for each in candidates if each.recording is not None]
     for recording in dict.fromkeys(each.recording for each in once):
         own = [each for each in once if each.recording == recording]
-        acted = _of_recording(fit, recording, segments)
+        acted = of_recording(fit, recording, segments)
         columns = columns_of(fit, looks_of(subject, own), segments, acted)
-        found += [each.screened for each in _judged(fit, columns, rows)]
+        found += [each.screened for each in at_best(fit, columns, rows)]
     return sorted(found, key=lambda each: -each.share)
 
 
@@ -142,7 +142,7 @@ def _once_more(
         count: of those to look at again.
     """
     known = {each: columns[each] for each in candidates if each in columns}
-    best = sorted(_judged(fit, known), key=lambda each: -each.screened.share)[:count]
+    best = sorted(at_best(fit, known), key=lambda each: -each.screened.share)[:count]
     kept = {each.screened.candidate for each in best}
     return [
         each for each in candidates if each in kept or each not in known or each.effect.name in LATE
@@ -150,7 +150,7 @@ def _once_more(
 
 
 def _closer(
-    fit: Fit, judged: Sequence[_Judged], segments: tuple[int, ...], picked: tuple[int, ...]
+    fit: Fit, judged: Sequence[AtBest], segments: tuple[int, ...], picked: tuple[int, ...]
 ) -> list[Screened]:
     """Return candidates as all parts show them, at the look that showed them in some.
 
@@ -171,10 +171,19 @@ def _closer(
         columns = np.empty((len(here.columns), len(rows)))
         columns[:, rows], columns[:, ~rows] = here.columns, there.columns
         both[each.screened.candidate] = [Looked(here.look, columns)]
-    return [each.screened for each in _judged(fit, both, rows)]
+    return [each.screened for each in at_best(fit, both, rows)]
 
 
-def _of_recording(fit: Fit, name: str | None, segments: tuple[int, ...]) -> tuple[int, ...]:
+def _picked(segments: tuple[int, ...]) -> tuple[int, ...]:
+    return segments[::_EVERY] if len(segments) >= _MANY else segments
+
+
+def shown_rows(fit: Fit, segments: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Return which rows of a fit's residual signatures are of."""
+    return fit.space.problem.rows_of(segments, _picked(segments))
+
+
+def of_recording(fit: Fit, name: str | None, segments: tuple[int, ...]) -> tuple[int, ...]:
     """Return those of some segments that are of a recording."""
     problem = fit.space.problem
     names = [each.name for each in problem.dataset.trajectories]
@@ -187,7 +196,7 @@ def _is_steady(subject: Subject, candidate: Candidate) -> bool:
     return all(each.is_smooth for each in found)
 
 
-def _judged(fit: Fit, columns: Columns, rows: NDArray[np.bool_] | None = None) -> list[_Judged]:
+def at_best(fit: Fit, columns: Columns, rows: NDArray[np.bool_] | None = None) -> list[AtBest]:
     """Return every candidate at its best.
 
     Args:
@@ -205,7 +214,7 @@ def _judged(fit: Fit, columns: Columns, rows: NDArray[np.bool_] | None = None) -
     bare = -along @ basis.T
     bare[:, : moved.shape[1]] += moved
     shown = slice(None) if rows is None else np.r_[rows, np.ones(fit.space.size, np.bool_)]
-    out: list[_Judged] = []
+    out: list[AtBest] = []
     begin = 0
     for candidate, looked in columns.items():
         tried: list[tuple[_Mixed, Looked, slice]] = []
@@ -221,7 +230,7 @@ def _judged(fit: Fit, columns: Columns, rows: NDArray[np.bool_] | None = None) -
             shift = least_squares(triangle, -(basis.T @ fit.residual + best.sizes @ along[own]))
             direction = (best.sizes @ bare[own])[shown]
             direction = direction / max(float(np.linalg.norm(direction)), 1e-12)
-        out.append(_Judged(Screened(candidate, start, shift, best.share, direction), each))
+        out.append(AtBest(Screened(candidate, start, shift, best.share, direction), each))
     return out
 
 
