@@ -13,7 +13,7 @@ from shared.identification.bent import far_from_file, is_worse, otherwise, worse
 from shared.identification.catalogue import effects
 from shared.identification.conclude import Conclusion, conclude, extended
 from shared.identification.dataset.caveats import in_words
-from shared.identification.dataset.types import Dataset
+from shared.identification.dataset.types import Dataset, stepped
 from shared.identification.effect import Effect
 from shared.identification.evidence import Evidence
 from shared.identification.gathered import evidence_of
@@ -24,11 +24,15 @@ from shared.identification.progress import Progress, silent
 from shared.identification.saved import load, save
 from shared.identification.search import search
 from shared.identification.searched import Search, is_open
-from shared.identification.timestep import coarse_step
+from shared.identification.subject import plant_of
+from shared.identification.timestep import coarse_step, shorter
 from shared.identification.verdict import Unexplained, Verdict
 from shared.identification.whole import fit_to_all
 from shared.runtime.build import commit
 from shared.runtime.service import version
+
+_LITTLE = 4.0
+"""Mean square residual, in noise floors, up to which a time step may be all that is wrong."""
 
 
 @dataclass(frozen=True)
@@ -63,17 +67,47 @@ def identify(
     """
     clock = _Stages()
     known = effects() if catalogue is None else tuple(catalogue)
-    found = begin(
-        dataset,
-        seed=seed,
-        progress=progress,
-        without=frozenset(without),
-        catalogue=known,
-        fits=None if resume_folder is None else load(resume_folder, dataset, seed),
-    )
-    if resume_folder is not None:
-        save(resume_folder, dataset, seed, found)
-    clock.over("base fit")
+
+    def begun(of: Dataset, folder: Path | None) -> Search:
+        fits = None if folder is None else load(folder, of, seed)
+        begins = begin(
+            of, seed=seed, progress=progress, without=frozenset(without), catalogue=known, fits=fits
+        )
+        if folder is not None:
+            save(folder, of, seed, begins)
+        clock.over("base fit")
+        return begins
+
+    found = begun(dataset, resume_folder)
+    found, left = _searched(found, seed, progress, clock)
+    if _may_be_its_step(found) and (step := shorter(found.base)) is not None:
+        progress("base fit", 0.0, f"again, at a time step of {1e3 * step:g} ms")
+        again = None if resume_folder is None else resume_folder / "shorter_step"
+        other = begun(stepped(dataset, step), again)
+        other, other_left = _searched(other, seed, progress, clock)
+        if not is_open(other):
+            found, left = other, other_left
+    if not found.accepted and not is_open(found):
+        found.otherwise = otherwise(found, progress)
+    clock.over("search")
+    progress("diagnostics", 0.0)
+    evidence = _evidence(found)
+    conclusion = conclude(found, left)
+    clock.over("diagnostics")
+    return Finding(_verdict(found, conclusion, left, dataset, seed, clock.seconds), evidence)
+
+
+def _searched(
+    found: Search, seed: int, progress: Progress, clock: "_Stages"
+) -> tuple[Search, tuple[Unexplained, ...]]:
+    """Return a search that is over, and what is left after it.
+
+    Args:
+        found: as it begins.
+        seed: of everything random.
+        progress: is told how far it is.
+        clock: is told what takes how long.
+    """
     untouched = fresh(found, seed)
     search(found, progress)
     clock.over("search")
@@ -104,14 +138,21 @@ def identify(
             found, left = other, _left(other)
         clock.over("search")
     fit_to_all(found, left)
-    if not found.accepted and not is_open(found):
-        found.otherwise = otherwise(found, progress)
     clock.over("search")
-    progress("diagnostics", 0.0)
-    evidence = _evidence(found)
-    conclusion = conclude(found, left)
-    clock.over("diagnostics")
-    return Finding(_verdict(found, conclusion, left, dataset, seed, clock.seconds), evidence)
+    return found, left
+
+
+def _may_be_its_step(found: Search) -> bool:
+    """Return whether a time step that is too long could be what a verdict tells of otherwise.
+
+    It leaves a little more than a verdict may leave, or something looks like a small push.
+    """
+    new, plain = (
+        min(each.current, np.inf if each.by_all is None else each.by_all)
+        for each in (found.left, found.plainly)
+    )
+    is_little = is_open(found) and max(new, plain) < _LITTLE
+    return is_little or any(one.is_event for one in found.accepted)
 
 
 def _pushed_once(found: Search, left: tuple[Unexplained, ...]) -> tuple[Unexplained, ...]:
@@ -160,7 +201,12 @@ def _verdict(
             *_uncounted(found),
             *filter(
                 None,
-                [worse_than_file(found), far_from_file(found.current), coarse_step(found.base)],
+                [
+                    worse_than_file(found),
+                    far_from_file(found.current),
+                    _shorter_step(found, dataset),
+                    coarse_step(found.base),
+                ],
             ),
             *in_words(dataset.caveats),
         ),
@@ -173,6 +219,18 @@ def _verdict(
         commit=commit(),
         cpu_s=sum(seconds.values()),
         seconds=seconds,
+        timestep=found.problem.subject.plant.timestep,
+    )
+
+
+def _shorter_step(found: Search, dataset: Dataset) -> str:
+    """Return in words that another time step than the model file's was taken; empty if not."""
+    step, own = found.problem.subject.plant.timestep, plant_of(dataset).timestep
+    if step == own:
+        return ""
+    return (
+        f"all of this was simulated at a time step of {1e3 * step:g} ms: at the model file's "
+        f"{1e3 * own:g} ms more than noise was left, or what looked like a push. model.xml has it"
     )
 
 

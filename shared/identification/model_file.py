@@ -16,7 +16,7 @@ from shared.errors import IdentificationError
 from shared.identification.base import base_parameters
 from shared.identification.catalogue import effects
 from shared.identification.creep import creep_of
-from shared.identification.dataset.types import Dataset, Float64
+from shared.identification.dataset.types import Dataset, Float64, stepped
 from shared.identification.effect import Effect, Quantity
 from shared.identification.subject import Subject, recorded_of, subject_of
 from shared.identification.verdict import Cause, Verdict
@@ -77,6 +77,8 @@ def model_file(dataset: Dataset, verdict: Verdict) -> ModelFile:
     Raises:
         IdentificationError: the verdict is not of this arm, or a fitted value cannot be written.
     """
+    if dataset.source.kind == "mjcf" and verdict.timestep is not None:
+        dataset = stepped(dataset, verdict.timestep)
     subject = subject_of(dataset, capacity=1)
     entries = [_entry(subject, cause) for cause in verdict.causes]
     if dataset.source.kind == "pr2":

@@ -26,7 +26,8 @@ class _Saved(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def save(folder: Path, dataset: Dataset, seed: int, found: Search) -> None:
-    """Write the base fit of a search."""
+    """Write the base fit of a search, in a folder that need not be there."""
+    folder.mkdir(parents=True, exist_ok=True)
     kept = _Saved(
         dataset=dataset.hash,
         model=repr(dataset.source),

@@ -45,6 +45,19 @@ def changed_by(fit: Fit, timestep: float) -> Float64:
     return np.sqrt(np.mean(np.concatenate(changed) ** 2, axis=0))
 
 
+def shorter(fit: Fit) -> float | None:
+    """Return the time step (s) by which to look again for what little is left; None if it is fine.
+
+    A quarter: what is left over for want of it is a sixteenth of the mean square then.
+
+    Args:
+        fit: of a model without causes.
+    """
+    subject = fit.space.problem.subject
+    is_coarse = subject.control != "pose" and float(step_error(fit).max()) > _MUCH
+    return 0.25 * subject.plant.timestep if is_coarse else None
+
+
 def coarse_step(fit: Fit) -> str:
     """Return in words that the time step is too long for what was recorded; empty if it is not.
 

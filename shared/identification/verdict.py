@@ -160,3 +160,5 @@ class Verdict(_Part, frozen=True, kw_only=True):
     cpu_s: float
     seconds: dict[str, float]
     """CPU seconds by stage."""
+    timestep: float | None = None
+    """Of the physics by which all of it was found (s); older verdicts do not say."""

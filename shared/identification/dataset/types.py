@@ -4,7 +4,7 @@ Times are seconds since the start of their trajectory on the recorder's clock; a
 its own clock, from the same instant as well as anybody knows.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -34,6 +34,8 @@ class ModelSource:
     """A ``model.toml`` of a PR2; None is the nominal model."""
     tracked: str = ""
     """Site or body of an MJCF that the tracker is fixed to."""
+    timestep: float | None = None
+    """Of the physics of an MJCF (s), if it is not to be the file's."""
 
 
 @dataclass(frozen=True)
@@ -113,3 +115,8 @@ class Dataset:
     def has_tracker(self) -> bool:
         """Whether every trajectory was tracked."""
         return all(each.tracker is not None for each in self.trajectories)
+
+
+def stepped(dataset: Dataset, timestep: float) -> Dataset:
+    """Return the recordings with another time step of the model's physics (s)."""
+    return replace(dataset, source=replace(dataset.source, timestep=timestep))

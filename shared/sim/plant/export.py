@@ -17,8 +17,9 @@ def patched_xml(
 ) -> str:
     """Return an arm's MJCF with fields of its model changed.
 
-    It is the file's own text, sensors and keyframes included, unless something was compiled into
-    the arm or its actuators gave way to motors: then it is the arm as identification simulates it.
+    It is the file's own text with the arm's time step, sensors and keyframes included, unless
+    something was compiled into the arm or its actuators gave way to motors: then it is the arm as
+    identification simulates it.
 
     Args:
         plant: the arm.
@@ -33,6 +34,7 @@ def patched_xml(
     compiled = spec.compile()
     kind: Any = mujoco.MjSpec  # its stub lacks reading a file
     own: mujoco.MjSpec = kind.from_file(str(path))
+    own.option.timestep = plant.timestep
     original = own.compile()
     if not structure and _actuators(original) == _actuators(compiled):
         spec, compiled = own, original

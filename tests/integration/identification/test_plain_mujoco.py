@@ -15,8 +15,7 @@ from shared.identification.find import identify
 from shared.identification.model_file import model_file
 
 _JOINTS = ("lift", "elbow")
-_STEP, _PERIOD, _SECONDS = 5e-4, 0.01, 6.0
-_NOISE = 1e-4
+_STEP, _PERIOD, _SECONDS = 5e-5, 0.01, 6.0
 _MOTIONS: dict[str, tuple[Split, str, tuple[float, float]]] = {
     "slow": ("train", "", (0.5, 0.7)),
     "again": ("train", "slow", (0.5, 0.7)),
@@ -44,7 +43,7 @@ def _mjcf(friction: Float64, damping: Float64, gains: Float64, step: float) -> s
       </body></body></worldbody><actuator>{servos}</actuator></mujoco>"""
 
 
-def _recording(name: str, xml: str, rng: np.random.Generator) -> Trajectory:
+def _recording(name: str, xml: str, noise: float, rng: np.random.Generator) -> Trajectory:
     """Return what encoders log at 100 Hz of an arm that stops for a while now and then."""
     split, repeats, speeds = _MOTIONS[name]
     at = _PERIOD * np.arange(round(_SECONDS / _PERIOD))
@@ -53,33 +52,57 @@ def _recording(name: str, xml: str, rng: np.random.Generator) -> Trajectory:
     model = mujoco.MjModel.from_xml_string(xml)
     data = mujoco.MjData(model)
     data.qpos[:] = data.ctrl[:] = command[0]
-    for _ in range(2000):
+    for _ in range(round(1.0 / _STEP)):
         mujoco.mj_step(model, data)
     q = np.empty_like(command)
     for row, target in enumerate(command):
         q[row], data.ctrl[:] = data.qpos, target
         for _ in range(round(_PERIOD / _STEP)):
             mujoco.mj_step(model, data)
-    q += _NOISE * rng.standard_normal(q.shape)
+    q += noise * rng.standard_normal(q.shape)
     return Trajectory(name, split, repeats, q[0], np.zeros(2), at, command, at, q)
+
+
+def _recorded(folder: Path, seed: int, step: float, noise: float, friction: Float64) -> Dataset:
+    """Return recordings of an arm of which the numbers are not quite its file's."""
+    rng = np.random.default_rng(seed)
+    damping, gains = np.array([0.3, 0.15]), np.array([40.0, 20.0])
+    spread = np.exp(rng.normal(0.0, 0.15, (3, 2)))
+    path = folder / "arm.xml"
+    path.write_text(_mjcf(friction, damping, gains, step))
+    own = _mjcf(friction * spread[0], damping * spread[1], gains * spread[2], _STEP)
+    made = tuple(_recording(name, own, noise, rng) for name in _MOTIONS)
+    source = ModelSource("mjcf", path)
+    return Dataset(folder, source, "position", _JOINTS, _JOINTS, made, (), "")
 
 
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_an_arm_that_is_as_its_file_says_has_no_cause(tmp_path: Path, seed: int):
-    rng = np.random.default_rng(seed)
-    friction, damping, gains = np.array([0.15, 0.08]), np.array([0.3, 0.15]), np.array([40.0, 20.0])
-    spread = np.exp(rng.normal(0.0, 0.15, (3, 2)))
-    path = tmp_path / "arm.xml"
-    path.write_text(_mjcf(friction, damping, gains, 0.002))
-    own = _mjcf(friction * spread[0], damping * spread[1], gains * spread[2], _STEP)
-    made = tuple(_recording(name, own, rng) for name in _MOTIONS)
-    source = ModelSource("mjcf", path)
-    dataset = Dataset(tmp_path, source, "position", _JOINTS, _JOINTS, made, (), "")
+    dataset = _recorded(tmp_path, seed, 0.002, 1e-4, np.array([0.15, 0.08]))
     verdict = identify(dataset, seed=seed).verdict
     assert verdict.verdict == "none"
+    assert verdict.timestep == 0.002
     assert verdict.held_out.base_fit < 1.1
     creep = next(each for each in verdict.base if each.name == "friction_creep")
     assert creep.base_fit == pytest.approx(1.0 / 9.0, rel=0.2)
     file = mujoco.MjModel.from_xml_string(model_file(dataset, verdict).text)
     assert file.dof_solimp[:, 0] == pytest.approx([0.9, 0.9], abs=0.02)
+
+
+@pytest.mark.timeout(300)
+def test_what_a_long_time_step_leaves_is_no_cause_but_a_shorter_step(tmp_path: Path):
+    dataset = _recorded(tmp_path, 1, 0.01, 1e-5, np.zeros(2))
+    verdict = identify(dataset, seed=1, resume_folder=tmp_path / "steps").verdict
+    assert verdict.verdict == "none"
+    assert verdict.timestep == 0.0025
+    assert any("at a time step of 2.5 ms" in each for each in verdict.caveats)
+    file = mujoco.MjModel.from_xml_string(model_file(dataset, verdict).text)
+    assert file.opt.timestep == 0.0025
+    assert (tmp_path / "steps" / "shorter_step" / "base_fit.json").exists()
+
+
+@pytest.mark.timeout(300)
+def test_what_a_long_time_step_leaves_is_no_push(tmp_path: Path):
+    verdict = identify(_recorded(tmp_path, 1, 0.005, 1e-5, np.zeros(2)), seed=1).verdict
+    assert verdict.verdict == "none"

@@ -7,7 +7,7 @@ import pytest
 
 from shared.identification.fit import Fit, polish
 from shared.identification.space import Space
-from shared.identification.timestep import changed_by, coarse_step, step_error
+from shared.identification.timestep import changed_by, coarse_step, shorter, step_error
 from tests.measured import measure, problem_of
 
 
@@ -38,3 +38,10 @@ def test_it_is_told_where_encoders_show_it(fit: Fit):
     assert "at 2 ms" in told
     assert "8.1 times the noise" in told
     assert "timestep=6e-05 leaves 0.5" in told  # a 32nd
+
+
+def test_a_quarter_is_tried_where_encoders_show_it(fit: Fit):
+    off = float(step_error(fit).max())
+    step = fit.space.problem.subject.plant.timestep
+    assert shorter(with_noise(fit, 1.01 * off)) is None
+    assert shorter(with_noise(fit, 0.99 * off)) == step / 4.0
