@@ -5,7 +5,7 @@ sums of sines at 1 kHz by torques, of which every second one is logged, and some
 little all the time. Every joint rubs, of which the file says nothing (as in ``stand_in.py``),
 damping and rotors are 20 to 30 % off, and nothing is repeated.
 
-Run ``python -m studies.real_data.seven_joints OUT --wrong payload``.
+Run ``python -m studies.other_arms.seven_joints OUT --wrong payload``.
 """
 
 import argparse

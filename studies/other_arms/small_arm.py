@@ -5,7 +5,7 @@ limit, damping, friction that is larger at rest (Stribeck) and may grow with the
 come late. Encoders have 12 bits, the log 50 Hz, and nothing is repeated, as in public recordings of
 such arms. The model has one gain and one friction for all joints.
 
-Run ``python -m studies.real_data.small_arm OUT``.
+Run ``python -m studies.other_arms.small_arm OUT``.
 """
 
 import argparse

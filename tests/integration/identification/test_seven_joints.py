@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shared.identification.dataset.reading import read_dataset
-from studies.real_data.seven_joints import JOINTS, convert
+from studies.other_arms.seven_joints import JOINTS, convert
 
 
 def missing(folder: Path) -> np.ndarray:

@@ -7,7 +7,7 @@ import pytest
 
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.dataset.types import Dataset
-from studies.real_data.small_arm import JOINTS, Wrong, convert
+from studies.other_arms.small_arm import JOINTS, Wrong, convert
 
 LIKE_ITS_MODEL = Wrong(delay=0.0, friction=1.0, at_rest=0.0)
 

@@ -1,0 +1,52 @@
+"""Arms that share nothing with the project's own, by plain MuJoCo, with one thing wrong."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shared.identification.dataset.reading import read_dataset
+from shared.identification.dataset.types import Dataset
+from studies.other_arms.arms import ARMS
+from studies.other_arms.faults import ABSORBED, FAULTS
+from studies.other_arms.recording import convert
+
+SECONDS = 2.0
+
+
+def made(folder: Path, arm: str, fault: str, seed: int = 3) -> Dataset:
+    convert(folder / fault, ARMS[arm], fault, SECONDS, seed)
+    return read_dataset(folder / fault)
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_an_arm_is_recorded_with_a_repeat_and_held_out_motion(tmp_path: Path, arm: str):
+    dataset = made(tmp_path, arm, "none")
+    assert dataset.joints == ARMS[arm].joints
+    assert dataset.control == ARMS[arm].control
+    splits = [each.split for each in dataset.trajectories]
+    assert (splits.count("train"), splits.count("test")) == (4, 2)
+    slow, again = dataset.trajectories[:2]
+    assert again.repeats == slow.name
+    off = np.abs(again.q - slow.q).mean(axis=0)
+    moved = np.ptp(slow.q, axis=0)
+    assert np.all(off < 0.02 * moved)
+    assert np.all(off > 0.0)
+
+
+@pytest.mark.parametrize(
+    ("arm", "fault"),
+    [("scara", name) for name in FAULTS if name not in ("none", "weak")] + [("three", "weak")],
+)
+def test_what_is_wrong_moves_the_arm_otherwise(tmp_path: Path, arm: str, fault: str):
+    right, wrong = (made(tmp_path, arm, name) for name in ("none", fault))
+    noise = ARMS[arm].noise
+    off = [
+        float(np.sqrt(np.mean((one.q - other.q) ** 2)))
+        for one, other in zip(right.trajectories, wrong.trajectories, strict=True)
+    ]
+    assert max(off) > 5.0 * noise
+
+
+def test_a_weak_drive_of_a_servo_is_its_gain():
+    assert ("position", "weak") in ABSORBED
