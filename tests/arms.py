@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Effect
-from shared.identification.subject import Subject
 from shared.sim.plant.plant import Plant, is_weightless, mjcf
 from shared.sim.plant.rollouts import Recorded, Reports, Rollouts
 from shared.sim.plant.row import Row

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from shared.identification.base import base_parameters
+from shared.identification.arm.subject import recorded_of, subject_of
 from shared.identification.dataset.types import Dataset, Float64, ModelSource, Trajectory
-from shared.identification.noise import noise_of
-from shared.identification.problem import BLOCK, Problem, Variant
-from shared.identification.subject import recorded_of, subject_of
+from shared.identification.fitting.parameters import base_parameters
+from shared.identification.fitting.problem import BLOCK, Problem, Variant
+from shared.identification.noise.floor import noise_of
 from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure

@@ -8,11 +8,11 @@ from shared.identification.catalogue.torque_bias import EFFECT as BIAS
 from shared.identification.catalogue.viscous_friction import EFFECT as VISCOUS
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
-from shared.identification.fit import Fit, Start, polish
-from shared.identification.gate import compare
-from shared.identification.screen import Screened
-from shared.identification.searched import Search, Tried
-from shared.identification.space import Space
+from shared.identification.fitting.fit import Fit, Start, polish
+from shared.identification.fitting.space import Space
+from shared.identification.gate.held_out import compare
+from shared.identification.search.screen import Screened
+from shared.identification.search.searched import Search, Tried
 from tests.measured import Enter, measure, nothing, plain, problem_of
 
 ELBOW, LIFT = Candidate(BIAS, "elbow"), Candidate(BIAS, "lift")

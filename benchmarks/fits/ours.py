@@ -1,7 +1,7 @@
 """Our identification on that fit: ``python -m benchmarks.fits.ours FOLDER`` prints JSON.
 
-The base fit's own steps (`shared.identification.fit.polish`) on short parts and then on the whole
-recording, with the armatures as the base's only parameters. Reading the data set is not timed.
+The base fit's own steps (`shared.identification.fitting.fit.polish`) on short parts, then on the
+whole recording; the armatures are the only parameters. Reading the data set is not timed.
 """
 
 import json
@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.fits.arm import JOINTS
-from shared.identification.base import base_parameters
+from shared.identification.arm.subject import subject_of
 from shared.identification.dataset.reading import read_dataset
-from shared.identification.fit import WINDOW, polish
-from shared.identification.noise import noise_of
-from shared.identification.problem import BLOCK, Problem
-from shared.identification.space import Space
-from shared.identification.subject import subject_of
+from shared.identification.fitting.fit import WINDOW, polish
+from shared.identification.fitting.parameters import base_parameters
+from shared.identification.fitting.problem import BLOCK, Problem
+from shared.identification.fitting.space import Space
+from shared.identification.noise.floor import noise_of
 
 STEPS = 30
 ENOUGH = 1e-5

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.identification.base_only import share_removed
-from shared.identification.cmaes import minimize
-from shared.identification.gate import plain_stretches
-from shared.identification.searched import Search
-from shared.identification.space import Space
+from shared.identification.fitting.cmaes import minimize
+from shared.identification.fitting.space import Space
+from shared.identification.gate.held_out import plain_stretches
+from shared.identification.search.searched import Search
 
 PENALTY = 0.05
 """Of the loss per candidate at its probe, as a share of what the base fit leaves."""

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from shared.identification.gate import floor_of
-from shared.identification.searched import Search, plain_losses
+from shared.identification.gate.held_out import floor_of
+from shared.identification.search.searched import Search, plain_losses
 
 
 def base_only(found: Search) -> dict[str, Any]:

@@ -8,11 +8,11 @@ import numpy as np
 from benchmarks.identification.all_at_once import all_at_once
 from benchmarks.identification.base_only import base_only
 from benchmarks.identification.mlp import mlp
-from shared.identification.begin import begin
 from shared.identification.catalogue import effects
 from shared.identification.dataset.types import Dataset
+from shared.identification.fitting.saved import load
 from shared.identification.progress import silent
-from shared.identification.saved import load
+from shared.identification.search.begin import begin
 
 
 def baselines(dataset: Dataset, seed: int, steps: Path) -> dict[str, Any]:

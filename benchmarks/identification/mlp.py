@@ -9,8 +9,8 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPRegressor
 
 from benchmarks.identification.base_only import share_removed
-from shared.identification.problem import BLOCK
-from shared.identification.searched import Search
+from shared.identification.fitting.problem import BLOCK
+from shared.identification.search.searched import Search
 from shared.sim.plant.signals import sampled
 
 _LAGS = (0.0, 0.05, 0.1)

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
-from shared.identification.subject import Subject
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure
 

@@ -7,27 +7,27 @@ from pathlib import Path
 
 import numpy as np
 
-from shared.identification.again import fresh, leave_out
-from shared.identification.begin import begin, begin_without, doubted_of
-from shared.identification.bent import far_from_file, is_worse, otherwise, worse_than_file
+from shared.identification.arm.subject import plant_of
 from shared.identification.catalogue import effects
-from shared.identification.conclude import Conclusion, conclude, extended
+from shared.identification.conclusion.conclude import Conclusion, conclude, extended
+from shared.identification.conclusion.evidence import Evidence
+from shared.identification.conclusion.gathered import evidence_of
 from shared.identification.dataset.caveats import in_words
 from shared.identification.dataset.types import Dataset, stepped
 from shared.identification.effect import Effect
-from shared.identification.evidence import Evidence
-from shared.identification.gathered import evidence_of
-from shared.identification.leftover import leftovers
-from shared.identification.once import is_named, take_back_pushes, take_pushes
-from shared.identification.problem import BLOCK, Variant
+from shared.identification.fitting.problem import BLOCK, Variant
+from shared.identification.fitting.saved import load, save
+from shared.identification.fitting.timestep import coarse_step, shorter
+from shared.identification.fitting.whole import fit_to_all
+from shared.identification.leftover.located import leftovers
 from shared.identification.progress import Progress, silent
-from shared.identification.saved import load, save
-from shared.identification.search import search
-from shared.identification.searched import Search, is_open
-from shared.identification.subject import plant_of
-from shared.identification.timestep import coarse_step, shorter
+from shared.identification.search.again import fresh, leave_out
+from shared.identification.search.begin import begin, begin_without, doubted_of
+from shared.identification.search.bent import far_from_file, is_worse, otherwise, worse_than_file
+from shared.identification.search.once import is_named, take_back_pushes, take_pushes
+from shared.identification.search.rounds import search
+from shared.identification.search.searched import Search, is_open
 from shared.identification.verdict import Unexplained, Verdict
-from shared.identification.whole import fit_to_all
 from shared.runtime.build import commit
 from shared.runtime.service import version
 

@@ -9,8 +9,8 @@ import msgspec
 from services.jobs.identify import command
 from services.jobs.identify.outputs import VERDICT_FILE
 from shared.errors import IdentificationError
+from shared.identification.conclusion.model_file import model_file
 from shared.identification.dataset.reading import read_dataset
-from shared.identification.model_file import model_file
 from shared.identification.verdict import Verdict
 from shared.runtime.files import atomic_write
 from studies.closing_the_loop.protocol import Folders, Protocol, need

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from services.jobs.identify import pictures, words
 from services.jobs.identify.pictures import Picture
-from shared.identification.evidence import Evidence
+from shared.identification.conclusion.evidence import Evidence
 from shared.identification.verdict import Scored, Tie, Verdict
 from shared.telemetry import html
 from shared.telemetry.html import Html, Node, tag

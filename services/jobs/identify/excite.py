@@ -15,6 +15,7 @@ from services.jobs.robot.playable import tool_limits
 from services.robot_io.config import SafetyConfig
 from shared.config.site import load_section
 from shared.errors import ConfigError, IdentificationError
+from shared.identification.arm.subject import subject_of
 from shared.identification.catalogue import effects
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.excitation.arm import Arm, mjcf_arm, pr2_arm
@@ -28,9 +29,8 @@ from shared.identification.excitation.prediction import (
 )
 from shared.identification.excitation.programme import SHOWS, Programme, design
 from shared.identification.excitation.writing import write_programme
-from shared.identification.noise import noise_of
-from shared.identification.problem import BLOCK
-from shared.identification.subject import subject_of
+from shared.identification.fitting.problem import BLOCK
+from shared.identification.noise.floor import noise_of
 from shared.sim.config import SimConfig
 from shared.sim.model import FencingModel
 

@@ -7,9 +7,9 @@ import msgspec
 
 from services.jobs.identify.overlay import write_overlay
 from services.jobs.identify.page import About, report_page
+from shared.identification.conclusion.evidence import Evidence
+from shared.identification.conclusion.model_file import model_file
 from shared.identification.dataset.types import Dataset
-from shared.identification.evidence import Evidence
-from shared.identification.model_file import model_file
 from shared.identification.verdict import Verdict
 from shared.runtime.files import atomic_write
 

@@ -7,9 +7,9 @@ import numpy as np
 
 from services.jobs.identify.residuals import rms_by_joint, shown, stages_of, tracker_off
 from services.jobs.identify.words import THOUSANDTHS, cause_text, unexplained_text
+from shared.identification.arm.subject import plant_of
+from shared.identification.conclusion.evidence import Evidence, Replay
 from shared.identification.dataset.types import Dataset, Float64
-from shared.identification.evidence import Evidence, Replay
-from shared.identification.subject import plant_of
 from shared.identification.verdict import Verdict
 from shared.sim.plant.looks import Looks
 from shared.telemetry.identification_recording import (

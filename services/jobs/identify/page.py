@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 from services.jobs.identify import considered, pictures, words
 from services.jobs.identify.residuals import stages_of
-from shared.identification.evidence import Evidence
-from shared.identification.model_file import Carried
-from shared.identification.sentence import as_told
+from shared.identification.conclusion.evidence import Evidence
+from shared.identification.conclusion.model_file import Carried
+from shared.identification.conclusion.sentence import as_told
 from shared.identification.verdict import Cause, Verdict
 from shared.telemetry import html
 from shared.telemetry.html import Html, Node, tag

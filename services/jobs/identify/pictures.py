@@ -18,8 +18,8 @@ from services.jobs.identify.residuals import (
     worst_joint,
 )
 from services.jobs.identify.words import THOUSANDTHS, floor_name, floor_text, unexplained_mark
+from shared.identification.conclusion.evidence import Diagnostics, Evidence
 from shared.identification.dataset.types import Float64
-from shared.identification.evidence import Diagnostics, Evidence
 from shared.identification.verdict import BaseValue, Scored, Verdict
 from shared.telemetry import identification_diagnostics as diagnostic
 from shared.telemetry import identification_figures as figures

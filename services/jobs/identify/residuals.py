@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shared.identification.conclusion.diagnose import diagnose
+from shared.identification.conclusion.evidence import STAGES, Diagnostics, Evidence, Replay, Stage
 from shared.identification.dataset.types import Float64
-from shared.identification.diagnose import diagnose
-from shared.identification.evidence import STAGES, Diagnostics, Evidence, Replay, Stage
 from shared.identification.verdict import Verdict
 
 WINDOW = 5.0

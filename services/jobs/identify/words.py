@@ -3,7 +3,7 @@
 import textwrap
 from pathlib import Path
 
-from shared.identification.sentence import as_told
+from shared.identification.conclusion.sentence import as_told
 from shared.identification.verdict import Cause, HeldOut, Interval, Tie, Unexplained, Verdict
 
 WIDTH = 88

@@ -7,11 +7,11 @@ included. EMPS (Janot 2019) has both forms.
 
 import numpy as np
 
+from shared.identification.arm.places import moving, place_of
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.passive import at_joint
-from shared.identification.places import moving, place_of
-from shared.identification.subject import Subject
+from shared.identification.laws.passive import at_joint
 from shared.sim.plant.row import Row
 from shared.sim.plant.step import Step
 from shared.sim.plant.structure import Structure

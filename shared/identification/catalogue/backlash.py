@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shared.identification.arm.places import moving, place_of
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.places import moving, place_of
-from shared.identification.series import link_inertia, seen_by_tracker, series
-from shared.identification.subject import Subject
+from shared.identification.laws.series import link_inertia, seen_by_tracker, series
 from shared.sim.plant.row import At, Row
 from shared.sim.plant.structure import Structure, series_name
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.subject import Subject
-from shared.identification.sway import start_swaying
-from shared.identification.vertical import horizontal_axes
+from shared.identification.laws.sway import start_swaying
+from shared.identification.laws.vertical import horizontal_axes
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Builder, Edit, Structure
 

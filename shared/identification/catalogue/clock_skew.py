@@ -1,8 +1,8 @@
 """The tracker's clock runs faster or slower than the robot's."""
 
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.subject import Subject
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure
 

@@ -1,9 +1,9 @@
 """Poses are commanded in another frame than the model's base frame."""
 
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.frames import frame_quantities
-from shared.identification.subject import Subject
+from shared.identification.laws.frames import frame_quantities
 from shared.sim.plant.poses import frame, seen_from
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal

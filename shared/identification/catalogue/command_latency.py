@@ -1,8 +1,8 @@
 """Commands reach the controller later than they were given."""
 
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.subject import Subject
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure
 

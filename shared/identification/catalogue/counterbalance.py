@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shared.identification.counterbalance import FLEX, LIFT, effort_per_turn
+from shared.identification.arm.places import place_of
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.places import place_of
-from shared.identification.subject import Subject
+from shared.identification.laws.counterbalance import FLEX, LIFT, effort_per_turn
 from shared.sim.plant.inverse import inverse_dynamics
 from shared.sim.plant.row import Row
 from shared.sim.plant.step import Step

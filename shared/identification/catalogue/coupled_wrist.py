@@ -4,11 +4,11 @@ Each motor of a differential turns with the sum or the difference of both joints
 WristTransmission), so its friction acts on both at once.
 """
 
-from shared.identification.coupling import couple, coupling_names
+from shared.identification.arm.places import moving, place_of
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.places import moving, place_of
-from shared.identification.subject import Subject
+from shared.identification.laws.coupling import couple, coupling_names
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Edit, Structure
 

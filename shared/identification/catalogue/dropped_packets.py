@@ -1,9 +1,9 @@
 """Commands get lost while the link to the robot is down."""
 
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.outages import lost_at, without
-from shared.identification.subject import Subject
+from shared.identification.laws.outages import lost_at, without
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure
 

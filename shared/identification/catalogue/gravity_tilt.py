@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.subject import Subject
-from shared.identification.vertical import horizontal_axes
+from shared.identification.laws.vertical import horizontal_axes
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure
 

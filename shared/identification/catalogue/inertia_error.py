@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from shared.identification.arm.places import moving
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.places import moving
-from shared.identification.subject import Subject
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure
 

@@ -2,11 +2,11 @@
 
 import math
 
+from shared.identification.arm.places import moving, place_of
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.places import moving, place_of
-from shared.identification.series import link_inertia, series
-from shared.identification.subject import Subject
+from shared.identification.laws.series import link_inertia, series
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure, series_name
 

@@ -5,9 +5,9 @@ from typing import Final
 
 import numpy as np
 
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.subject import Subject
 from shared.sim.plant.kinematics import turned_axes
 from shared.sim.plant.plant import Plant, is_weightless
 from shared.sim.plant.row import Row

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.subject import Subject
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal
 from shared.sim.plant.structure import Structure

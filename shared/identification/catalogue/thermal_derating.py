@@ -13,12 +13,12 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from shared.identification.arm.motion import Motion, smooth_motion
+from shared.identification.arm.places import moving, place_of
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.motion import Motion, smooth_motion
-from shared.identification.passive import at_joint
-from shared.identification.places import moving, place_of
-from shared.identification.subject import Subject
+from shared.identification.laws.passive import at_joint
 from shared.sim.plant.inverse import inverse_dynamics
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal

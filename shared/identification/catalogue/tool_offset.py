@@ -1,9 +1,9 @@
 """The tracker sits elsewhere on the tool than the model has it."""
 
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.frames import frame_quantities, move_hand
-from shared.identification.subject import Subject
+from shared.identification.laws.frames import frame_quantities, move_hand
 from shared.sim.plant.poses import frame
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure

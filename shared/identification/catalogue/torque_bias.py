@@ -1,10 +1,10 @@
 """A joint's drive pushes by a constant torque that nobody asked for."""
 
+from shared.identification.arm.places import moving, place_of
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.passive import add_spring
-from shared.identification.places import moving, place_of
-from shared.identification.subject import Subject
+from shared.identification.laws.passive import add_spring
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure
 

@@ -1,9 +1,9 @@
 """The tracker's world is not where its calibration says it is."""
 
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.frames import frame_quantities, move_world
-from shared.identification.subject import Subject
+from shared.identification.laws.frames import frame_quantities, move_world
 from shared.sim.plant.poses import frame
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure

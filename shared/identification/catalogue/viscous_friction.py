@@ -1,9 +1,9 @@
 """A joint is braked in proportion to its speed."""
 
+from shared.identification.arm.places import moving, place_of
+from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.places import moving, place_of
-from shared.identification.subject import Subject
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure
 

@@ -13,14 +13,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.identification.base import base_parameters
+from shared.identification.arm.subject import Subject, subject_of
 from shared.identification.dataset.types import Dataset, Float64
 from shared.identification.effect import Candidate, Effect
 from shared.identification.excitation.arm import TIMESTEP
-from shared.identification.noise import Noise
-from shared.identification.problem import Problem, Variant
-from shared.identification.space import Space
-from shared.identification.subject import Subject, subject_of
+from shared.identification.fitting.parameters import base_parameters
+from shared.identification.fitting.problem import Problem, Variant
+from shared.identification.fitting.space import Space
+from shared.identification.noise.floor import Noise
 from shared.sim.plant.plant import pr2
 from shared.sim.plant.rollouts import Recorded, Rollouts
 from shared.sim.plant.row import Row

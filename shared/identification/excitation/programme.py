@@ -13,11 +13,11 @@ from typing import Final, Literal
 import numpy as np
 
 from shared.errors import IdentificationError
+from shared.identification.arm.motion import motion_of
 from shared.identification.dataset.types import POSE, Dataset, Float64, Split, Trajectory
 from shared.identification.excitation import motions
 from shared.identification.excitation.arm import Arm
 from shared.identification.excitation.limits import Limits, hurry, is_inside, strain
-from shared.identification.motion import motion_of
 from shared.sim.plant.inverse import inverse_dynamics
 from shared.sim.plant.rollouts import Recorded, Reports
 from shared.sim.plant.signals import Signal, pose_error

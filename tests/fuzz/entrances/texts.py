@@ -26,9 +26,9 @@ from services.jobs.train import pipeline
 from services.robot_io.vive.calibration import Calibration, load_calibration
 from shared.config.site import dump, load_section
 from shared.errors import ConfigError, IdentificationError, SnapshotError
-from shared.identification import saved
 from shared.identification.dataset.manifest import read_manifest
 from shared.identification.excitation import reading
+from shared.identification.fitting import saved
 from shared.identification.hidden.truth import Truth, read_truth
 from shared.sim.parameters import dump_parameters, load_parameters
 from shared.styles.bundle import Bundle, BundlePlayer, load_bundle
@@ -198,7 +198,7 @@ def _json(folder: Path) -> list[Target]:
         (best, lambda: sources.exploitability_part(folder, state, []), None, (),
          "services.jobs.reproduction.sources:exploitability_part"),
         (folder / saved.FILE, lambda: saved.load(folder, data, 0), saved._Saved, (),
-         "shared.identification.saved:load"),
+         "shared.identification.fitting.saved:load"),
     ]  # fmt: skip
     known = {
         "page.json": (b'{"url": "http://127.0.0.1:8000", "pid": 1}',),

@@ -10,9 +10,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from shared.identification.conclusion.model_file import model_file
 from shared.identification.dataset.types import Dataset, Float64, ModelSource, Split, Trajectory
 from shared.identification.find import identify
-from shared.identification.model_file import model_file
 
 _JOINTS = ("lift", "elbow")
 _STEP, _PERIOD, _SECONDS = 5e-5, 0.01, 6.0

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from shared.identification.base import BaseParameter, base_parameters
+from shared.identification.arm.subject import subject_of
 from shared.identification.dataset.reading import PR2_JOINTS
 from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource, Trajectory
-from shared.identification.subject import subject_of
+from shared.identification.fitting.parameters import BaseParameter, base_parameters
 from shared.identification.verdict import BaseValue, Cause, HeldOut, Interval, Verdict
 from shared.sim.config import SimConfig
 from shared.sim.model import FencingModel

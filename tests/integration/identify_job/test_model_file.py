@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from shared.errors import IdentificationError
-from shared.identification.base import base_parameters
+from shared.identification.arm.subject import recorded_of, subject_of
 from shared.identification.catalogue import effects
+from shared.identification.conclusion.model_file import ModelFile, model_file
 from shared.identification.dataset.types import Dataset, Float64, ModelSource
-from shared.identification.model_file import ModelFile, model_file
-from shared.identification.subject import recorded_of, subject_of
+from shared.identification.fitting.parameters import base_parameters
 from shared.identification.verdict import Cause, Verdict
 from shared.sim.config import SimConfig
 from shared.sim.model import FencingModel

@@ -9,9 +9,9 @@ import pytest
 
 from services.jobs.identify.overlay import PAUSE, overlay_of, write_overlay
 from shared.errors import RiposteError
+from shared.identification.arm.subject import plant_of
+from shared.identification.conclusion.model_file import model_file
 from shared.identification.dataset.types import Dataset
-from shared.identification.model_file import model_file
-from shared.identification.subject import plant_of
 from shared.sim.plant.looks import Looks
 from shared.sim.plant.plant import pr2
 from shared.telemetry.identification_recording import path_of, write_overlay_recording

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from shared.identification.conclude import conclude
-from shared.identification.search import _simplest  # pyright: ignore[reportPrivateUsage]
+from shared.identification.conclusion.conclude import conclude
+from shared.identification.search.rounds import _simplest  # pyright: ignore[reportPrivateUsage]
 from tests.searches import DRAG, ELBOW, LIFT, OFFSET, Searches
 
 LOSSES = st.lists(st.floats(0.3, 300.0), min_size=6, max_size=6).map(np.array)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
+from shared.identification.conclusion.diagnose import diagnose
+from shared.identification.conclusion.evidence import Evidence, Replay
+from shared.identification.conclusion.model_file import Carried
 from shared.identification.dataset.types import Float64
-from shared.identification.diagnose import diagnose
-from shared.identification.evidence import Evidence, Replay
-from shared.identification.model_file import Carried
 from shared.identification.verdict import (
     BaseValue,
     Cause,

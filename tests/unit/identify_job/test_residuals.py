@@ -14,7 +14,7 @@ from services.jobs.identify.residuals import (
     window_of,
     worst_joint,
 )
-from shared.identification.diagnose import diagnose
+from shared.identification.conclusion.diagnose import diagnose
 from tests.unit.identify_job.examples import NOISE, example
 
 

@@ -15,7 +15,7 @@ from services.jobs.identify.words import (
     unexplained_text,
     verdict_text,
 )
-from shared.identification.sentence import sentence_of
+from shared.identification.conclusion.sentence import sentence_of
 from shared.identification.verdict import Cause, Interval
 from tests.unit.identify_job.examples import WORDS, example
 

@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shared.identification.arm.subject import recorded_of, subject_of
 from shared.identification.catalogue import effects
 from shared.identification.hidden.generator import simulated
 from shared.identification.hidden.noise import NoiseLevels
 from shared.identification.hidden.recipe import Recipe, Wish
-from shared.identification.subject import recorded_of, subject_of
 from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.signals import pose_error, sampled_poses
 

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from shared.errors import IdentificationError
+from shared.identification.arm.subject import subject_of
 from shared.identification.catalogue import effects
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.hidden.generator import hide, simulated
 from shared.identification.hidden.recipe import Recipe, Wish
 from shared.identification.hidden.truth import read_truth
-from shared.identification.subject import subject_of
 from shared.sim.hidden.effect import hidden_effects
 
 SMALL = Recipe(arm="torque2", seconds=2.0, train=2, test=1, has_shares=False, seed=11)

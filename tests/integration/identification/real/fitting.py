@@ -5,16 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
-from shared.identification.base import base_parameters
+from shared.identification.arm.subject import subject_of
 from shared.identification.catalogue import effects
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
-from shared.identification.fit import polish
-from shared.identification.noise import noise_of
-from shared.identification.problem import BLOCK, Problem, Variant
-from shared.identification.space import Space
-from shared.identification.subject import subject_of
+from shared.identification.fitting.fit import polish
+from shared.identification.fitting.parameters import base_parameters
+from shared.identification.fitting.problem import BLOCK, Problem, Variant
+from shared.identification.fitting.space import Space
+from shared.identification.noise.floor import noise_of
 
 
 @dataclass(frozen=True)

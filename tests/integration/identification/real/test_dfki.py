@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from shared.identification.arm.subject import subject_of
 from shared.identification.dataset.reading import read_dataset
-from shared.identification.problem import Problem
-from shared.identification.subject import subject_of
+from shared.identification.fitting.problem import Problem
 from studies.real_data import dfki
 from tests.integration.identification.real.fitting import Fitted, fitted, problem_of
 

@@ -8,10 +8,10 @@ from scipy.io import loadmat
 
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.find import identify
-from shared.identification.fit import floor_from_base, polish
-from shared.identification.leftover import leftovers
-from shared.identification.problem import Problem
-from shared.identification.space import Space
+from shared.identification.fitting.fit import floor_from_base, polish
+from shared.identification.fitting.problem import Problem
+from shared.identification.fitting.space import Space
+from shared.identification.leftover.located import leftovers
 from studies.real_data import emps
 from tests.integration.identification.real.fitting import Fitted, fitted, problem_of
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from shared.identification import catalogue
+from shared.identification.arm.subject import Subject, subject_of
 from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource, Trajectory
 from shared.identification.effect import Candidate, Effect
-from shared.identification.subject import Subject, subject_of
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.plant import mjcf, pr2
 from shared.sim.plant.rollouts import Recorded, Reports, Rollouts

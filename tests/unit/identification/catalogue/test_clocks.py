@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shared.identification.arm.subject import Subject
 from shared.identification.catalogue.clock_skew import EFFECT as SKEW
 from shared.identification.catalogue.tracker_latency import EFFECT as LATENCY
 from shared.identification.dataset.types import Float64
-from shared.identification.subject import Subject
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.rollouts import Reports
 from shared.sim.plant.signals import Signal, sampled

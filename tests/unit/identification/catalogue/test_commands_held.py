@@ -3,11 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shared.identification.arm.subject import Subject
 from shared.identification.catalogue.dropped_packets import EFFECT as DROPPED
 from shared.identification.catalogue.sample_and_hold import EFFECT as HELD
 from shared.identification.dataset.types import Float64, Trajectory
-from shared.identification.outages import lost_at, without
-from shared.identification.subject import Subject
+from shared.identification.laws.outages import lost_at, without
 from shared.sim.plant.rollouts import Recorded, Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal

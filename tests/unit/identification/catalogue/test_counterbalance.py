@@ -4,14 +4,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shared.identification.arm.subject import Subject
 from shared.identification.catalogue.counterbalance import EFFECT
-from shared.identification.counterbalance import (
+from shared.identification.laws.counterbalance import (
     BAR_TOLERANCE,
     SCREW_TOLERANCE,
     effort_per_turn,
     turns_of,
 )
-from shared.identification.subject import Subject
 from shared.sim.plant.plant import pr2
 from tests.arms import make_plant, make_subject, recorded, replay
 

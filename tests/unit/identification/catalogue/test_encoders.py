@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
+from shared.identification.arm.subject import Subject
 from shared.identification.catalogue.encoder_offset import EFFECT as OFFSET
 from shared.identification.catalogue.encoder_scale import EFFECT as SCALE
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Effect
-from shared.identification.subject import Subject
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.plant import pr2
 from shared.sim.plant.rollouts import Reports, Rollouts

@@ -3,8 +3,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shared.identification.arm.subject import Subject
 from shared.identification.catalogue.external_contact import EFFECT
-from shared.identification.subject import Subject
 from tests.arms import make_plant, make_subject, recorded, replay
 
 

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
+from shared.identification.arm.subject import Subject
 from shared.identification.catalogue.command_frame import EFFECT as COMMAND
 from shared.identification.catalogue.tool_offset import EFFECT as TOOL
 from shared.identification.catalogue.tracker_frame import EFFECT as WORLD
 from shared.identification.dataset.types import Float64
-from shared.identification.subject import Subject
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.plant import pr2
 from shared.sim.plant.poses import conjugate, frame, product, rotated, seen_from

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shared.identification.arm.subject import Subject
 from shared.identification.catalogue.cogging import EFFECT as COGGING
 from shared.identification.catalogue.inertia_error import EFFECT as INERTIA
 from shared.identification.catalogue.joint_spring import EFFECT as SPRING
@@ -16,7 +17,6 @@ from shared.identification.catalogue.torque_bias import EFFECT as BIAS
 from shared.identification.catalogue.torque_saturation import EFFECT as SATURATION
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Effect
-from shared.identification.subject import Subject
 from shared.sim.plant.plant import mjcf
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shared.identification.arm.subject import Subject
 from shared.identification.catalogue.asymmetric_friction import EFFECT as ASYMMETRIC
 from shared.identification.catalogue.coulomb_friction import EFFECT as COULOMB
 from shared.identification.catalogue.coupled_wrist import EFFECT as COUPLED
@@ -15,7 +16,6 @@ from shared.identification.catalogue.stribeck_friction import EFFECT as STRIBECK
 from shared.identification.catalogue.viscous_friction import EFFECT as VISCOUS
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Effect
-from shared.identification.subject import Subject
 from shared.sim.plant.plant import mjcf
 from shared.sim.plant.rollouts import Reports
 from tests.arms import make_plant, make_subject, recorded, replay, still

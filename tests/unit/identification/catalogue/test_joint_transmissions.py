@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shared.identification.arm.subject import Subject
 from shared.identification.catalogue.backlash import EFFECT as BACKLASH
 from shared.identification.catalogue.joint_elasticity import EFFECT as ELASTICITY
 from shared.identification.dataset.types import Float64
-from shared.identification.subject import Subject
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.plant import pr2
 from shared.sim.plant.rollouts import Recorded, Reports

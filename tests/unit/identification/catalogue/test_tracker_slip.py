@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shared.identification.arm.slips import slip_of
+from shared.identification.arm.subject import Subject
 from shared.identification.catalogue.tracker_slip import EFFECT
 from shared.identification.dataset.types import Float64, Trajectory
-from shared.identification.slips import slip_of
-from shared.identification.subject import Subject
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.poses import conjugate, rotated
 from shared.sim.plant.rollouts import Reports

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shared.identification.arm.subject import Subject
 from shared.identification.catalogue import (
     base_compliance,
     gravity_tilt,
@@ -13,7 +14,6 @@ from shared.identification.catalogue import (
     payload,
 )
 from shared.identification.effect import Effect
-from shared.identification.subject import Subject
 from shared.sim.hidden.arms import ARMS
 from shared.sim.plant.plant import mjcf
 from shared.sim.plant.rollouts import Rollouts

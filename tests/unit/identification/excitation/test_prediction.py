@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shared.identification.base import base_parameters
 from shared.identification.catalogue import (
     command_latency,
     joint_spring,
@@ -21,9 +20,10 @@ from shared.identification.excitation.prediction import (
     predict,
 )
 from shared.identification.excitation.programme import Programme, design
-from shared.identification.noise import Noise, noise_of
-from shared.identification.problem import BLOCK, Problem, Variant
-from shared.identification.space import Space
+from shared.identification.fitting.parameters import base_parameters
+from shared.identification.fitting.problem import BLOCK, Problem, Variant
+from shared.identification.fitting.space import Space
+from shared.identification.noise.floor import Noise, noise_of
 from tests.arms import write_arm
 
 EFFECTS = (

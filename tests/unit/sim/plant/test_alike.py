@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from shared.identification.arm.subject import recorded_of, subject_of
 from shared.identification.catalogue.base_compliance import EFFECT as GIVES
-from shared.identification.subject import recorded_of, subject_of
 from shared.sim.plant.rollouts import Entry, Recorded, Reports, Rollouts
 from shared.sim.plant.row import JointsReport, Row
 from tests.measured import measure, nothing

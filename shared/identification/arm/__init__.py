@@ -1,0 +1,1 @@
+"""What is being identified: one arm, what its recordings reach, and how they are replayed."""

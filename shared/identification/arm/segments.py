@@ -1,0 +1,74 @@
+"""What a data set is replayed in: whole recordings, or parts of them.
+
+Under a controller that holds the arm to its command a whole recording is one part. Elsewhere only
+short parts say something, see :data:`shared.identification.arm.parts.CUTS`.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shared.identification.arm.parts import CUT, CUTS, Cut, part_of, spans_of, states_of
+from shared.identification.arm.subject import Subject
+from shared.identification.dataset.types import Dataset, Float64, Trajectory
+from shared.sim.plant.rollouts import Recorded
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A part of a recording."""
+
+    trajectory: int
+    recorded: Recorded
+    q: Float64
+    """float64[T, J], what was logged (rad, m)."""
+    tracker: Float64 | None
+    """float64[K, 7]."""
+
+
+def segments_of(
+    dataset: Dataset, subject: Subject, window: float | None = None
+) -> tuple[Segment, ...]:
+    """Return the parts that a data set is replayed in.
+
+    A repeat is not replayed: its commands are those of what it repeats, it measures the noise.
+
+    Args:
+        dataset: the recordings.
+        subject: the arm.
+        window: length of a part (s); None for whole recordings, or what the control allows.
+    """
+    cut = CUTS.get(subject.control)
+    if window is not None:
+        cut = replace(cut or CUT, length=window)
+    found: list[Segment] = []
+    for index, trajectory in enumerate(dataset.trajectories):
+        if not trajectory.repeats:
+            found += _segments(index, trajectory, cut, subject.plant.timestep)
+    names = tuple(each.name for each in dataset.trajectories)
+    return tuple(
+        replace(each, recorded=replace(each.recorded, earlier=names[: each.trajectory]))
+        for each in found
+    )
+
+
+def _segments(
+    index: int, trajectory: Trajectory, cut: Cut | None, timestep: float
+) -> list[Segment]:
+    spans = np.zeros((0, 2)) if cut is None else spans_of(trajectory, cut)
+    if cut is None or not len(spans):
+        known = (trajectory.initial_q, trajectory.initial_qd)
+        return [_segment(index, trajectory, 0.0, np.inf, known)]
+    states = states_of(trajectory, spans[:, 0], timestep, cut)
+    return [
+        _segment(index, trajectory, float(begin), float(end), state)
+        for (begin, end), state in zip(spans, states, strict=True)
+    ]
+
+
+def _segment(
+    index: int, of: Trajectory, begin: float, end: float, state: tuple[Float64, Float64]
+) -> Segment:
+    recorded, joints, tracker = part_of(of, begin, end, state)
+    poses = None if of.tracker is None or not len(tracker) else of.tracker[tracker]
+    return Segment(index, recorded, of.q[joints], poses)

@@ -1,0 +1,1 @@
+"""Puts what was found into words, numbers, pictures' data and a model file."""

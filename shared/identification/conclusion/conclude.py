@@ -1,0 +1,219 @@
+"""Puts a search into words: the verdict, what speaks for it, and what it does not say."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shared.identification.conclusion.causes import causes_of, ties_of
+from shared.identification.conclusion.sentence import sentence_of
+from shared.identification.dataset.types import Float64
+from shared.identification.fitting.problem import Variant
+from shared.identification.gate.certainty import half_widths, is_there
+from shared.identification.gate.held_out import compare, floor_of
+from shared.identification.search.bent import ties_with_base
+from shared.identification.search.searched import ALIKE, Search, Tried, is_open, plain_losses
+from shared.identification.verdict import (
+    BaseValue,
+    Cause,
+    HeldOut,
+    Interval,
+    Scored,
+    Tie,
+    Unexplained,
+    Word,
+)
+
+STANDS_OUT = 5.0
+"""Size of a stretch, in noise floors, that is not passed over whatever the mean residual is."""
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """The parts of a verdict that follow from a search."""
+
+    word: Word
+    sentence: str
+    causes: tuple[Cause, ...]
+    ties: tuple[Tie, ...]
+    held_out: HeldOut
+    candidates: tuple[Scored, ...]
+    base: tuple[BaseValue, ...]
+
+
+def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
+    """Return what a search comes to.
+
+    Args:
+        found: the search, over.
+        left: what the extended model does not explain.
+    """
+    held_out = _held_out(found)
+    widths = _widths(found)
+    accepted = causes_of(found, widths)
+    ties = ties_of(found, accepted) or ties_with_base(found)
+    word = _word(found, ties, left)
+    sure = tuple(cause for cause, rivals in zip(accepted, found.rivals, strict=True) if not rivals)
+    told = accepted if word == "unexplained" else sure
+    return Conclusion(
+        word=word,
+        sentence=sentence_of(word, told, ties, held_out, left),
+        causes=sure if word in ("named", "tie") else (),
+        ties=ties if word == "tie" else (),
+        held_out=held_out,
+        candidates=_scored(found, word),
+        base=_base(found, widths),
+    )
+
+
+def _widths(found: Search) -> Float64:
+    """Return float64[n], half widths of the coordinates' intervals.
+
+    What is no noise does not shrink with more recordings, so the wider one of two fits is told;
+    but of a cause that only all recordings together show, what they say.
+    """
+    train = found.problem.of("train")
+    first = half_widths(found.current, train)
+    if found.final is None:
+        return first
+    last = half_widths(found.final, found.fitted_to)
+    widths = np.maximum(first, last)
+    for each in found.accepted:
+        if not is_there(found.current, each.candidate, train):
+            where = found.current.space.where(each.candidate)
+            widths[where] = last[where]
+    return widths
+
+
+def extended(found: Search) -> Variant:
+    """Return the model with what was accepted."""
+    return found.current.variant
+
+
+def _word(found: Search, ties: tuple[Tie, ...], left: tuple[Unexplained, ...]) -> Word:
+    if found.accepted:
+        if is_open(found):
+            return "unexplained"
+        return "tie" if ties else "named"
+    if is_open(found):
+        return "base_too_coarse" if found.doubted else "unexplained"
+    if _stands_out(left):
+        return "unexplained"
+    return "tie" if ties else "none"
+
+
+def _stands_out(left: tuple[Unexplained, ...]) -> bool:
+    """Return whether something that happened is too large to pass over."""
+    return any(each.times_noise > STANDS_OUT for each in left)
+
+
+def _held_out(found: Search) -> HeldOut:
+    problem = found.problem
+    of_nominal, of_base, of_current = plain_losses(found)
+    gain = compare(of_base, of_current, np.random.default_rng(0))
+    base = float(of_base.mean())
+    nothing = Variant(np.zeros(len(problem.parameters)))
+    stages = {
+        "nominal": nothing,
+        "base_fit": found.base.variant,
+        "extended": extended(found),
+    }
+    test = problem.of("test")
+    reports = problem.reports(list(stages.values()), test)
+    joints: dict[str, float] = {}
+    tracker: dict[str, float] = {}
+    for name, rows in zip(stages, reports, strict=True):
+        raw = [problem.raw(report, segment) for report, segment in zip(rows, test, strict=True)]
+        joints[name] = 1e3 * _rms([of_joints for of_joints, _ in raw])
+        positions = [seen[:, :3] for _, seen in raw if seen is not None]
+        if positions:
+            tracker[name] = 1e3 * _rms(positions)
+    joints["noise_floor"] = 1e3 * float(np.sqrt(np.mean(problem.noise.joints**2)))
+    if problem.noise.tracker is not None:
+        tracker["noise_floor"] = 1e3 * float(np.sqrt(np.mean(problem.noise.tracker[:3] ** 2)))
+    low, high = gain.share_interval(base) if found.accepted else (0.0, 0.0)
+    return HeldOut(
+        nominal=float(np.sqrt(of_nominal.mean())),
+        base_fit=float(np.sqrt(base)),
+        extended=float(np.sqrt(of_current.mean())),
+        noise_floor=float(np.sqrt(floor_of(base))),
+        share_removed=gain.share(base) if found.accepted else 0.0,
+        share_interval=Interval(low=low, high=high)
+        if found.accepted
+        else Interval(low=0.0, high=0.0),
+        joints_mrad=joints,
+        tracker_mm=tracker,
+        is_floor_measured=problem.noise.is_measured,
+        by_all=None if found.by_all is None else float(np.sqrt(found.by_all.plain)),
+    )
+
+
+def _rms(parts: list[Float64]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate([part.ravel() for part in parts]) ** 2)))
+
+
+def _scored(found: Search, word: Word) -> tuple[Scored, ...]:
+    """Return every candidate, those that were refitted first."""
+    accepted = {each.candidate.label for each in found.accepted}
+    rivals = {each.candidate.label for group in found.rivals for each in group}
+    out: list[Scored] = []
+    for label, screened in found.screened.items():
+        candidate = screened.candidate
+        tried = found.tried.get(label)
+        if tried is None:
+            out.append(
+                Scored(
+                    effect=candidate.effect.name,
+                    where=candidate.place,
+                    screen=screened.share,
+                    why_not="not among the best at first sight" if label not in accepted else "",
+                )
+            )
+            continue
+        quantity = candidate.effect.quantities(found.problem.subject, candidate.place)[0]
+        out.append(
+            Scored(
+                effect=candidate.effect.name,
+                where=candidate.place,
+                screen=screened.share,
+                gain=tried.gain.gain,
+                gain_interval=Interval(low=tried.gain.low, high=tried.gain.high),
+                value=float(tried.fit.space.values(tried.fit.z)[-1][0]),
+                unit=quantity.unit,
+                why_not=_why_not(tried, found, label, accepted, rivals, word),
+            )
+        )
+    return tuple(sorted(out, key=lambda one: (one.gain is None, -(one.gain or 0.0), -one.screen)))
+
+
+def _why_not(
+    tried: Tried, found: Search, label: str, accepted: set[str], rivals: set[str], word: Word
+) -> str:
+    base = float(found.base_losses.mean())
+    if label in accepted:
+        return "" if word == "named" else "too much is left over with it" * (word == "unexplained")
+    if label in rivals:
+        return f"does as well as what was taken, within {ALIKE:.0%} of the gain or its error"
+    if tried.gain.surely <= 0.0 and tried.gain.apart is None:
+        return "no better on held-out recordings"
+    if not tried.gain.is_useful(base):
+        return "better, but by too little to be of use"
+    return "explained better by what was taken"
+
+
+def _base(found: Search, widths: Float64) -> tuple[BaseValue, ...]:
+    first, final = found.base, found.told
+    out: list[BaseValue] = []
+    for index, each in enumerate(found.problem.parameters):
+        z, half = float(final.z[index]), float(widths[index])
+        low, high = each.value(max(z - half, each.low)), each.value(min(z + half, each.high))
+        out.append(
+            BaseValue(
+                name=each.name,
+                unit=each.unit,
+                nominal=each.nominal,
+                base_fit=each.value(float(first.z[index])),
+                extended=each.value(z),
+                interval=Interval(low=low, high=high),
+            )
+        )
+    return tuple(out)

@@ -1,0 +1,121 @@
+"""Says in a sentence or two what a search comes to."""
+
+import msgspec
+
+from shared.identification.search.searched import NEARLY_NOISE
+from shared.identification.verdict import Cause, HeldOut, Interval, Tie, Unexplained, Word
+from shared.telemetry.wording import listing
+
+
+def sentence_of(
+    word: Word,
+    causes: tuple[Cause, ...],
+    ties: tuple[Tie, ...],
+    held_out: HeldOut,
+    left: tuple[Unexplained, ...],
+) -> str:
+    """Return the verdict for people."""
+    floor = "the noise" if held_out.is_floor_measured else "what the base fit usually leaves"
+    ratio = f"{held_out.base_fit:.2f} times {floor}"
+    if word == "named":
+        return (
+            f"What the simulation gets wrong: {_named(causes)}. Held out, the residual goes from "
+            f"{ratio} to {held_out.extended:.2f}{_by_all(held_out)}.{_also_pushed(left)}"
+        )
+    if word == "tie":
+        either = " or ".join(label(cause) for cause in ties[0].causes)
+        told = f"These recordings do not tell apart: {either}. {ties[0].record}"
+        if not causes:
+            return told
+        return f"What the simulation surely gets wrong: {_named(causes)}. Beside it: {told}"
+    if word == "none":
+        told = f"{ratio}{_by_all(held_out)}"
+        return f"Nothing to name: with its base fitted the simulation is at {told}."
+    if word == "base_too_coarse":
+        return (
+            f"The base model does not fit: {ratio} are left with links far from their known mass. "
+            "Release more of its parameters, or correct the model file, before looking for causes."
+        )
+    if causes:
+        names = " and ".join(f"{label(cause)} ({_size(cause)})" for cause in causes)
+        why = "which is too much to believe it"
+        if held_out.extended >= held_out.nominal:
+            why = f"and the model file as it is {held_out.nominal:.2f}"
+        return (
+            f"Something is wrong that no effect of the catalogue explains. Nearest comes {names}, "
+            f"but from {ratio} it leaves {held_out.extended:.2f}, {why}."
+        )
+    if left and all(each.is_external for each in left):
+        return f"Nothing to name but what came from outside.{_also_pushed(left)}"
+    if left and held_out.base_fit**2 <= NEARLY_NOISE:
+        first = left[0]
+        return (
+            f"With its base fitted the simulation is at {ratio}, but something stands out that no "
+            f"effect of the catalogue explains: at {first.where}, from {first.begin:.2f} to "
+            f"{first.end:.2f} s of {first.trajectory}, {first.times_noise:.3g} times the noise."
+        )
+    place = f", most of it at {left[0].where} {left[0].phase}" if left else ""
+    return f"Something is wrong that no effect of the catalogue explains: {ratio}{place}."
+
+
+def _by_all(held_out: HeldOut) -> str:
+    """Return what is left with held-out motion in the fit, where the verdict goes by that."""
+    left = held_out.by_all
+    return "" if left is None else f", {left:.2f} once it is fitted to these, too"
+
+
+def _also_pushed(left: tuple[Unexplained, ...]) -> str:
+    """Return what came from outside, the largest first; a sentence after a blank, or nothing."""
+    pushes = [each for each in left if each.is_external]
+    if not pushes:
+        return ""
+    first = pushes[0]
+    count = "once," if len(pushes) == 1 else f"{len(pushes)} times, most"
+    size = "" if first.torque is None else f" with {first.torque:.3g} {first.torque_unit}"
+    return (
+        f" Something outside pushed {first.where} {count} from "
+        f"{first.begin:.2f} to {first.end:.2f} s of {first.trajectory}{size}."
+    )
+
+
+def label(cause: Cause) -> str:
+    """Return what and where a cause is, in plain words."""
+    words = cause.effect.replace("_", " ")
+    return f"{words} of {cause.where}" if cause.where else words
+
+
+def _named(causes: tuple[Cause, ...]) -> str:
+    """Return causes in words, with all the joints of one effect together."""
+    places: dict[str, list[str]] = {}
+    for cause in causes:
+        where = f"at {cause.where} " if cause.where else ""
+        places.setdefault(cause.title, []).append(f"{where}({_size(cause)})")
+    return " and ".join(f"{title} {listing(each)}" for title, each in places.items())
+
+
+def as_told(cause: Cause) -> Cause:
+    """Return a cause with a size for people: of what is sought as one over it, the thing itself.
+
+    ``inverse_limit`` in 1/(N m) is a limit in N m; its upper end is infinite where the inverse may
+    be 0, which is no limit.
+    """
+    name = cause.quantity.removeprefix("inverse_")
+    if name == cause.quantity or not cause.value > 0.0:
+        return cause
+    low, high = cause.interval.low, cause.interval.high
+    return msgspec.structs.replace(
+        cause,
+        quantity=name,
+        value=1.0 / cause.value,
+        unit=cause.unit.removeprefix("1/").strip("()"),
+        interval=Interval(low=1.0 / high, high=1.0 / low if low > 0.0 else float("inf")),
+    )
+
+
+def _size(cause: Cause) -> str:
+    told = as_told(cause)
+    unit = "" if told.unit == "1" else f" {told.unit}"
+    if told.interval.high == float("inf"):
+        return f"{told.quantity} {told.value:.3g}{unit}, at least {told.interval.low:.3g}"
+    half = (told.interval.high - told.interval.low) / 2
+    return f"{told.quantity} {told.value:.3g} ± {half:.1g}{unit}"

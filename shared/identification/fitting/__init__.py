@@ -1,0 +1,1 @@
+"""The base and what is beside it, fitted to recordings."""

@@ -1,0 +1,232 @@
+"""Variants of the model against the recordings: residuals in units of the noise floor."""
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.identification.arm.segments import Segment, segments_of
+from shared.identification.arm.subject import Subject
+from shared.identification.dataset.types import Dataset, Float64
+from shared.identification.effect import Candidate
+from shared.identification.fitting.parameters import BaseParameter, enter_base
+from shared.identification.noise.floor import Noise
+from shared.sim.plant.rollouts import Reports, Rollouts
+from shared.sim.plant.row import Row
+from shared.sim.plant.signals import pose_error
+from shared.sim.plant.structure import Structure
+
+BLOCK = 0.02
+"""Residuals are averaged over this long: what a 50 Hz look at the arm would see (s)."""
+DIVERGED = 1e3
+"""Residual of an arm whose physics diverged, in noise floors."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """The base model at coordinates, with effects in it."""
+
+    x: Float64
+    """float64[n]."""
+    extras: tuple[tuple[Candidate, Float64], ...] = ()
+
+    def with_extra(self, candidate: Candidate, values: Float64) -> "Variant":
+        """Return it with one more effect, or with another size of one it has."""
+        kept = tuple(extra for extra in self.extras if extra[0] != candidate)
+        return Variant(self.x, (*kept, (candidate, values)))
+
+
+@dataclass
+class Problem:
+    """A data set, an arm, and what is fitted."""
+
+    subject: Subject
+    dataset: Dataset
+    parameters: tuple[BaseParameter, ...]
+    noise: Noise
+    window: float | None = None
+    """Length of the parts that are replayed (s); None for as long as they come."""
+    uncounted: dict[int, NDArray[np.bool_]] = field(default_factory=dict[int, NDArray[np.bool_]])
+    """bool[B] by segment: blocks that no loss counts, since something outside acted there."""
+    segments: tuple[Segment, ...] = field(init=False)
+    _structures: dict[Structure, Rollouts] = field(default_factory=dict[Structure, Rollouts])
+    _bins: dict[int, tuple["_Bins", "_Bins | None"]] = field(init=False)
+    _whitening: dict[int, Float64 | None] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.segments = segments_of(self.dataset, self.subject, self.window)
+        self._structures.setdefault((), self.subject.nominal)
+        self._bins = {}
+        self._whitening = {}
+        for index, segment in enumerate(self.segments):
+            recorded = segment.recorded
+            tracker = None if recorded.tracker_at is None else _Bins.of(recorded.tracker_at)
+            of_joints = _Bins.of(recorded.joints_at)
+            self._bins[index] = (of_joints, tracker)
+            q = of_joints.mean(segment.q)
+            self._whitening[index] = self.noise.whitening(self.subject.nominal, q)
+
+    def in_parts(self, longest: float) -> "Problem":
+        """Return :meth:`windowed`, no longer than what the problem has already."""
+        is_short = all(segment.recorded.joints_at[-1] <= longest for segment in self.segments)
+        return self if is_short else self.windowed(longest)
+
+    def windowed(self, window: float) -> "Problem":
+        """Return the same with recordings in parts that each start from the measured state."""
+        return Problem(
+            self.subject, self.dataset, self.parameters, self.noise, window,
+            _structures=self._structures,
+        )  # fmt: skip
+
+    def freer(self, more: Sequence[BaseParameter]) -> "Problem":
+        """Return the same with more numbers in the base, after those that it has."""
+        return Problem(
+            self.subject, self.dataset, (*self.parameters, *more), self.noise, self.window,
+            self.uncounted, _structures=self._structures,
+        )  # fmt: skip
+
+    def of(self, split: str) -> tuple[int, ...]:
+        """Return the segments of the trajectories to fit to (``train``) or held out (``test``)."""
+        return tuple(
+            index
+            for index, segment in enumerate(self.segments)
+            if self.dataset.trajectories[segment.trajectory].split == split
+        )
+
+    def structure(self, variant: Variant) -> Structure:
+        """Return what has to be compiled into the arm for a variant."""
+        edits = [
+            edit
+            for candidate, _ in variant.extras
+            for edit in candidate.effect.structure(self.subject, candidate.place)
+        ]
+        return tuple(dict.fromkeys(edits))
+
+    def reports(self, variants: Sequence[Variant], segments: Sequence[int]) -> list[list[Reports]]:
+        """Return what each variant would have logged, by variant and segment."""
+        groups: dict[Structure, list[int]] = defaultdict(list)
+        for index, variant in enumerate(variants):
+            groups[self.structure(variant)].append(index)
+        out: list[list[Reports]] = [[] for _ in variants]
+        for structure, members in groups.items():
+            if structure not in self._structures:
+                self._structures[structure] = Rollouts(self.subject.plant, structure, 64)
+            work = [
+                (self._entry(variants[index]), self.segments[segment].recorded)
+                for index in members
+                for segment in segments
+            ]
+            found = self._structures[structure].run(work)
+            for position, index in enumerate(members):
+                out[index] = found[position * len(segments) : (position + 1) * len(segments)]
+        return out
+
+    def residuals(
+        self, variants: Sequence[Variant], segments: Sequence[int]
+    ) -> list[list[Float64]]:
+        """Return residuals in noise floors, by variant and segment: float64[B, C].
+
+        Where repeats say what noise carries on, what is new in each block. B blocks of
+        ``BLOCK``; C are the joints, then position and rotation of the tracker.
+        """
+        return [
+            [
+                self.noise.news(self.floors(report, segment))
+                for report, segment in zip(reports, segments, strict=True)
+            ]
+            for reports in self.reports(variants, segments)
+        ]
+
+    def shape_of(self, segment: int) -> tuple[int, int]:
+        """Return the shape of a segment's :meth:`residuals`: blocks, channels."""
+        of_joints, of_tracker = self._bins[segment]
+        rows, channels = len(of_joints.starts), len(self.noise.joints)
+        if of_tracker is not None and self.noise.tracker is not None:
+            rows, channels = min(rows, len(of_tracker.starts)), channels + len(self.noise.tracker)
+        return rows, channels
+
+    def size_of(self, segment: int) -> int:
+        """Return how many numbers of :meth:`vector` are a segment's."""
+        return math.prod(self.shape_of(segment))
+
+    def rows_of(self, segments: Sequence[int], picked: Sequence[int]) -> NDArray[np.bool_]:
+        """Return bool[M]: which numbers of :meth:`vector` on segments are of those picked."""
+        wanted = set(picked)
+        return np.concatenate(
+            [np.full(self.size_of(segment), segment in wanted) for segment in segments]
+        )
+
+    def plain(self, variant: Variant, segments: Sequence[int]) -> list[Float64]:
+        """Return residuals in noise floors as they are, whatever noise carries on, by segment.
+
+        What is slow counts for as much there as what is fast.
+        """
+        (reports,) = self.reports([variant], segments)
+        return [self.floors(each, segment) for each, segment in zip(reports, segments, strict=True)]
+
+    def vector(self, variants: Sequence[Variant], segments: Sequence[int]) -> Float64:
+        """Return float64[V, M]: the residuals of each variant in one row."""
+        return np.stack(
+            [
+                np.concatenate([part.ravel() for part in parts])
+                for parts in self.residuals(variants, segments)
+            ]
+        )
+
+    def raw(self, reports: Reports, segment: int) -> tuple[Float64, Float64 | None]:
+        """Return the residuals at every reading: float64[T, J] (rad, m) and float64[K, 6]."""
+        recorded, logged = self.segments[segment].recorded, self.segments[segment]
+        joints = logged.q - reports.q
+        if recorded.tracker_at is None or reports.tracker is None or logged.tracker is None:
+            return joints, None
+        return joints, pose_error(logged.tracker, reports.tracker)
+
+    def in_floors(self, joints: Float64, segment: int) -> Float64:
+        """Return block means of a segment's joint residuals, float64[B, J], in noise floors."""
+        return self.noise.floors(joints, self._whitening[segment])
+
+    def floors(self, reports: Reports, segment: int) -> Float64:
+        """Return float64[B, C]: block means of a segment's residuals in noise floors."""
+        joints, tracker = self.raw(reports, segment)
+        of_joints, of_tracker = self._bins[segment]
+        out = self.in_floors(of_joints.mean(joints), segment)
+        if tracker is not None and of_tracker is not None and self.noise.tracker is not None:
+            more = of_tracker.mean(tracker) / self.noise.tracker
+            rows = min(len(out), len(more))
+            out = np.concatenate([out[:rows], more[:rows]], axis=1)
+        return np.nan_to_num(out, nan=DIVERGED, posinf=DIVERGED, neginf=-DIVERGED)
+
+    def _entry(self, variant: Variant) -> "_Enter":
+        return _Enter(self.parameters, variant)
+
+
+@dataclass(frozen=True)
+class _Enter:
+    parameters: tuple[BaseParameter, ...]
+    variant: Variant
+
+    def __call__(self, row: Row) -> None:
+        enter_base(self.parameters, self.variant.x, row)
+        for candidate, values in self.variant.extras:
+            candidate.effect.enter(row, candidate.place, values)
+
+
+@dataclass(frozen=True)
+class _Bins:
+    """Which readings are averaged."""
+
+    starts: np.ndarray
+    counts: Float64
+
+    @staticmethod
+    def of(at: Float64) -> "_Bins":
+        number = np.floor((at - at[0]) / BLOCK + 1e-6).astype(np.int64)
+        starts = np.flatnonzero(np.r_[True, np.diff(number) > 0])
+        return _Bins(starts, np.diff(np.r_[starts, len(at)]).astype(np.float64)[:, None])
+
+    def mean(self, values: Float64) -> Float64:
+        """Return float64[B, D]."""
+        return np.add.reduceat(values, self.starts, axis=0) / self.counts

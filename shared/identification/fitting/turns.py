@@ -1,0 +1,171 @@
+"""Finds an interval that comes again and again, which its cost alone does not lead to.
+
+Off by little, an interval is off by more at every turn, and by half of itself before the end of a
+recording: the cost has a minimum at every few such steps. So it is sought as a frequency is,
+roughly in the first second of the recording that shows it best, then closer in the first second
+of all, in twice as much, and so on. What the base could absorb is taken out of the cost: the mean
+delay, which half of an interval makes, is much of what an interval does, and says little about it.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from shared.identification.dataset.types import Float64
+from shared.identification.fitting.space import Space
+
+LATE = {"sample_and_hold": "command_latency"}
+"""What hardly differs from another cause while it is small: a command that is taken at intervals
+is late by half of one."""
+_FIRST = 1.0
+"""How much of each recording is looked at first (s)."""
+_FINE = 6.0
+"""Steps in which a turn at the end of what is looked at moves by a whole interval."""
+
+
+class About(NamedTuple):
+    """How well an interval is known."""
+
+    factor: float
+    """Times as long, or as short, as it may be."""
+    phases: int
+    """Of a turn, that are tried first."""
+    closer: int
+    """Times that steps are halved once all of the recordings are looked at."""
+
+
+WIDE = About(1.6, 8, 2)
+"""Where only the screen has seen it."""
+LIKELY = About(1.25, 8, 2)
+"""Where it makes the delay that fits best: half of it, and what the base makes up for."""
+NEAR = About(1.005, 32, 5)
+"""Where the base was fitted with it. Which command a turn takes jumps, so of a hundred turns the
+one that is nearest to a command must be right to a hundredth of their interval."""
+_FEWEST, _MOST = 5, 256
+"""Intervals tried first. Where it would take more, turns come so often that only their mean shows,
+and that is smooth."""
+_KEPT = 6
+"""Best ones that are looked at more closely."""
+_AROUND = (-1.0, -0.5, 0.0, 0.5, 1.0)
+"""Steps about what was kept."""
+
+
+@dataclass(frozen=True)
+class Turning:
+    """Which of a vector's numbers are an interval and the phase of its first turn."""
+
+    interval: int
+    interval_probe: float
+    phase: int
+    phase_probe: float
+
+    def at(self, z: Float64, interval: float, phase: float) -> Float64:
+        """Return a vector with them in their own units."""
+        moved = z.copy()
+        moved[self.interval] = interval / self.interval_probe
+        moved[self.phase] = phase % 1.0 / self.phase_probe
+        return moved
+
+
+def turning_of(space: Space) -> Turning | None:
+    """Return where the newest candidate of a space has an interval, None where it has none."""
+    candidate = space.candidates[-1]
+    quantities = candidate.effect.quantities(space.problem.subject, candidate.place)
+    first = space.size - len(quantities)
+    for index, each in enumerate(quantities):
+        if each.phase:
+            names = [other.name for other in quantities]
+            phase = names.index(each.phase)
+            return Turning(first + index, each.probe, first + phase, quantities[phase].probe)
+    return None
+
+
+def aligned(
+    space: Space,
+    z: Float64,
+    segments: tuple[int, ...],
+    about: About = WIDE,
+    base: Float64 | None = None,
+) -> Float64:
+    """Return the vector with the interval, and the phase, that fit best; as it is if none do.
+
+    Args:
+        space: its newest candidate may have an interval; the vector stays as it is if it has none,
+            or one so short that turns cannot be told apart.
+        z: float64[n], with about the interval.
+        segments: recordings to fit to.
+        about: how well it is known.
+        base: float64[M, b], derivative on the segments by the numbers before the candidate's; what
+            they could absorb is taken out of the cost.
+    """
+    turning = turning_of(space)
+    if turning is None or z[turning.interval] <= 0.0:
+        return z
+    parts = {segment: space.problem.segments[segment].recorded for segment in segments}
+    expected = float(z[turning.interval]) * turning.interval_probe
+    last = max(part.begin + float(part.joints_at[-1]) for part in parts.values())
+    reach = max(_FIRST, *(float(part.joints_at[-1]) for part in parts.values()))
+    step = expected**2 / (_FINE * reach)
+    low, high = expected / about.factor, expected * about.factor
+    count = max(int(np.ceil((high - low) / max(step, 1e-9))), _FEWEST)
+    if count > _MOST:
+        return z
+    cost = _Cost(space, segments, base)
+    wider = 1.0 / about.phases
+    tries: list[tuple[float, float]] = [
+        (float(interval), phase * wider)
+        for interval in np.geomspace(low, high, count)
+        for phase in range(about.phases)
+    ]
+    picked = tuple(segment for segment in segments if parts[segment].begin < reach)
+    first = turning.at(z, expected, 0.0), turning.at(z, expected, 0.5)
+    costs = cost([turning.at(z, *each) for each in tries], (cost.telling(*first, picked),))
+    closer = 0
+    while True:
+        best: list[tuple[float, float]] = [tries[index] for index in np.argsort(costs)[:_KEPT]]
+        fine = _FINE * min(reach, last) * 2.0**closer
+        tries = [
+            (interval + along * interval**2 / fine, phase + around * wider)
+            for interval, phase in best
+            for along in _AROUND
+            for around in (-1.0, 0.0, 1.0)
+        ]
+        picked = tuple(segment for segment in segments if parts[segment].begin < reach)
+        vectors = [space.clip(turning.at(z, *each)) for each in tries]
+        costs = cost(vectors, picked)
+        if reach >= last and closer == about.closer:
+            found = vectors[int(np.argmin(costs))]
+            return found if costs.min() < cost([z], picked)[0] else z
+        closer += reach >= last
+        reach *= 2.0
+        wider *= 0.5
+
+
+class _Cost:
+    """Sums of squares, without what other numbers could absorb."""
+
+    def __init__(self, space: Space, segments: tuple[int, ...], base: Float64 | None) -> None:
+        self._space, self._segments, self._base = space, segments, base
+
+    def __call__(self, vectors: list[Float64], picked: tuple[int, ...]) -> Float64:
+        """Return float64[V]: of each vector, on some of the segments."""
+        found = self._space.residual(vectors, picked)
+        if self._base is None:
+            return np.asarray(np.sum(found**2, axis=1), np.float64)
+        problem, numbers = self._space.problem, self._base.shape[1]
+        sizes = [problem.size_of(segment) for segment in self._segments]
+        wanted = [segment in picked for segment in self._segments]
+        rows = self._base[: sum(sizes)][np.repeat(wanted, sizes)]
+        found = found[:, : len(rows) + numbers]  # what is known of them beforehand counts
+        able = np.concatenate([rows, np.diag(1.0 / self._space.priors[:numbers])])
+        basis = np.linalg.qr(able).Q
+        return np.asarray(np.sum((found - found @ basis @ basis.T) ** 2, axis=1), np.float64)
+
+    def telling(self, one: Float64, other: Float64, picked: tuple[int, ...]) -> int:
+        """Return the segment in which two vectors differ most."""
+        differ = [
+            float(np.sum(np.ptp(self._space.residual([one, other], (segment,)), axis=0) ** 2))
+            for segment in picked
+        ]
+        return picked[int(np.argmax(differ))]

@@ -1,0 +1,69 @@
+"""Fits what a search came to once more, to all recordings.
+
+Which causes there are is judged on recordings that nothing was fitted to. Once that is done those
+may say how large they are, too: of five recordings two would otherwise have no say in it. They may
+also say how much of what is left comes of what the others did not show of the base, a friction
+that only one of them begins with: that is no cause.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shared.identification.dataset.types import Float64
+from shared.identification.fitting.fit import Fit, polish
+from shared.identification.gate.held_out import plain_stretches
+from shared.identification.search.searched import ByAll, Search, is_open
+from shared.identification.verdict import Unexplained
+
+_STEPS = 1
+"""Derivatives after the first: it begins where three in five of the recordings lead."""
+
+
+def fit_to_all(found: Search, left: Sequence[Unexplained]) -> None:
+    """Fit a search's model to the held-out recordings, too.
+
+    If a cause was accepted, for its size; if much is left, for how much of that remains. Held-out
+    recordings in which something pushed the arm, or in which blocks do not count, stay out of it.
+
+    Args:
+        found: the search, over.
+        left: what its model does not explain.
+    """
+    problem, current = found.problem, found.current
+    pushed = {each.trajectory for each in left if each.is_external}
+    names = [each.name for each in problem.dataset.trajectories]
+    more = tuple(
+        segment
+        for segment in problem.of("test")
+        if segment not in problem.uncounted
+        and names[problem.segments[segment].trajectory] not in pushed
+    )
+    is_asked = is_open(found) and problem.noise.is_measured
+    if not more or not (found.accepted or is_asked):
+        return
+    segments = (*problem.of("train"), *more)
+    fit = polish(current.space, current.z, segments, _STEPS, known=_known(current, more))
+    if found.accepted:
+        found.final, found.fitted_to = fit, segments
+    if is_asked:
+        both = [_left(fit, segments, of) for of in (problem.of("train"), more)]
+        found.by_all = ByAll(max(one.new for one in both), max(one.plain for one in both))
+
+
+def _known(fit: Fit, more: tuple[int, ...]) -> tuple[Float64, Float64]:
+    """Return residual and derivative of a fit on more segments after those that it has."""
+    residual, jacobian = fit.space.jacobian(fit.z, more)
+    rows = len(fit.residual) - fit.space.size
+    return (
+        np.concatenate([fit.residual[:rows], residual]),
+        np.concatenate([fit.jacobian[:rows], jacobian]),
+    )
+
+
+def _left(fit: Fit, segments: tuple[int, ...], of: tuple[int, ...]) -> ByAll:
+    """Return the mean square residuals of some of the segments of a fit."""
+    problem = fit.space.problem
+    rows = problem.rows_of(segments, of)
+    plain = plain_stretches(problem, fit.variant, of)
+    return ByAll(float(np.mean(fit.residual[: len(rows)][rows] ** 2)), float(plain.mean()))

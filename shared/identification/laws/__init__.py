@@ -1,0 +1,1 @@
+"""Torques and motions that several effects of the catalogue are made of."""

@@ -1,0 +1,1 @@
+"""What a model does not explain: where, when, and whether something pushed."""

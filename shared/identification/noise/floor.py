@@ -1,0 +1,299 @@
+"""The noise floor: how far two recordings of the same commands differ.
+
+Half the mean square of the difference of repeats, of the block means that residuals are made of.
+It has everything that a model cannot know: sensors, and whatever pushes the arm at random. It is
+never less than what an encoder's steps hide: of a joint at rest two recordings may say the same
+to the last digit.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shared.identification.arm.parts import CUTS, Cut, spans_of
+from shared.identification.arm.smoothing import smooth
+from shared.identification.arm.starts import Starts
+from shared.identification.dataset.caveats import difference
+from shared.identification.dataset.resolution import steps_of
+from shared.identification.dataset.types import Dataset, Float64, Trajectory
+from shared.identification.noise.drift import Drift, drift_of
+from shared.identification.noise.memory import Memory, memory_of
+from shared.identification.noise.pushed import Pushed, pushed_of, whitening
+from shared.identification.noise.quiet import level_of
+from shared.sim.plant.rollouts import Rollouts
+from shared.sim.plant.signals import pose_error, sampled, sampled_poses
+
+Integers = NDArray[np.intp]
+
+_BAND = 25
+"""Without repeats: readings that a local cubic is taken through."""
+_FEWEST = 10
+"""Readings that two recordings have to share, else the last of the shorter one is held."""
+_OF_PAIR = np.sqrt(0.5)
+"""Of what two recordings differ by, that is the noise of one."""
+_SAME = 1e-3
+"""Share of their movement by which commands differ that are the same but for rounding."""
+_ROUND = np.sqrt(12.0)
+"""A step, in standard deviations of what rounding to it does."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations of block means."""
+
+    joints: Float64
+    """float64[J] (rad, m)."""
+    tracker: Float64 | None
+    """float64[6] (m, rad)."""
+    correlation: Float64
+    """float64[C], of neighbouring blocks, joints first."""
+    is_measured: bool
+    """Whether repeats were there; else only what is faster than the arm was seen."""
+    pushed: Pushed | None = None
+    """Where a controller holds the tool alone: what joints differ by otherwise."""
+    whitened: Float64 | None = None
+    """float64[J], standard deviations of whitened residuals (1)."""
+    memory: Memory | Drift | None = None
+    """How much of it is carried on from block to block, or how it grows where nothing holds the
+    arm; None where no repeat says so, and nothing else does."""
+
+    def floors(self, residuals: Float64, whiten: Float64 | None) -> Float64:
+        """Return residuals of joints in noise floors.
+
+        Args:
+            residuals: float64[B, J], block means (rad, m).
+            whiten: float64[B, J, J], from :meth:`whitening`.
+        """
+        if whiten is None or self.whitened is None:
+            return residuals / self.joints
+        return np.einsum("bij,bj->bi", whiten, residuals) / self.whitened
+
+    def news(self, residuals: Float64) -> Float64:
+        """Return what is new in each block of residuals in noise floors: float64[B, C].
+
+        All of it where nothing is known of what noise carries on, see :class:`Memory`.
+        """
+        return residuals if self.memory is None else self.memory.news(residuals)
+
+    def growing(self, drift: Drift, blocks: int) -> "Noise":
+        """Return the same of an arm that nothing holds.
+
+        Args:
+            drift: how noise grows, in these noise floors.
+            blocks: of a part; over so many its mean square becomes 1.
+        """
+        size = np.sqrt(np.mean(drift.spread(blocks) ** 2, axis=0))
+        count = len(self.joints)
+        return replace(
+            self,
+            joints=self.joints * size[:count],
+            tracker=None if self.tracker is None else self.tracker * size[count:],
+            memory=drift.scaled(size),
+        )
+
+    def whitening(self, nominal: Rollouts, q: Float64) -> Float64 | None:
+        """Return what :meth:`floors` needs of an arm at postures float64[B, J]; None for most."""
+        return None if self.pushed is None else whitening(self.pushed, nominal, q)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """What a recording and its repeat differ by, as block means."""
+
+    joints: Float64
+    """float64[B, J] (rad, m)."""
+    tracker: Float64 | None
+    """float64[B', 6] (m, rad)."""
+    q: Float64
+    """float64[B, J], where the joints were (rad, m)."""
+    joints_parts: Integers
+    """int[B], of which part of the recording each is."""
+    tracker_parts: Integers | None
+    """int[B']."""
+
+
+def noise_of(
+    dataset: Dataset, block: float, starts: Starts, nominal: Rollouts | None = None
+) -> Noise:
+    """Return the noise floor of a data set.
+
+    Args:
+        dataset: the recordings; those with ``repeats`` are compared with what they repeat.
+        block: what residuals are averaged over (s).
+        starts: what repeats differ by for starting elsewhere.
+        nominal: the arm; None for one that is held by its joints.
+    """
+    cut = None if nominal is None else CUTS.get(nominal.plant.control)
+    pairs = repeat_differences(dataset, block, starts, cut)
+    joints = [each.joints for each in pairs]
+    tracker = [each.tracker for each in pairs if each.tracker is not None]
+    if pairs:
+        scale = _OF_PAIR
+    else:
+        joints = [block_means(each.joints_at, _fast(each.joints_at, each.q), block)
+                  for each in dataset.trajectories]  # fmt: skip
+        tracker = [
+            block_means(each.tracker_at, _fast(each.tracker_at, each.tracker), block)
+            for each in dataset.trajectories
+            if each.tracker_at is not None and each.tracker is not None
+        ]
+        scale = 1.0
+    of_joints, joint_correlation = level_of(joints, scale)
+    rounding = steps_of([each.q for each in dataset.trajectories]) / _ROUND
+    of_joints = np.maximum(of_joints, rounding)
+    of_tracker, correlation = None, joint_correlation
+    if dataset.has_tracker and tracker:
+        of_tracker, tracker_correlation = level_of(tracker, scale)
+        if not pairs:  # poses have seven numbers, their errors six
+            of_tracker = np.r_[of_tracker[:3], np.repeat(2.0 * of_tracker[4:].mean(), 3)]
+            tracker_correlation = tracker_correlation[:6]
+        correlation = np.r_[joint_correlation, tracker_correlation]
+    found = Noise(of_joints, of_tracker, correlation, is_measured=bool(pairs))
+    differences = [(each.joints, each.q) for each in pairs]
+    pushed = None if nominal is None else pushed_of(nominal, differences, scale)
+    if not pairs:
+        return found
+    hidden = rounding / of_joints
+    if nominal is not None and pushed is not None:
+        unit = replace(found, pushed=pushed, whitened=np.ones(len(of_joints)))
+        whole = [unit.floors(each.joints, unit.whitening(nominal, each.q)) for each in pairs]
+        _, correlation = level_of(whole, scale)
+        whitened = scale * np.sqrt(np.mean(np.concatenate(whole) ** 2, axis=0))
+        correlation = np.r_[correlation, found.correlation[len(whitened) :]]
+        found = replace(unit, whitened=whitened, correlation=correlation)
+        hidden = np.zeros(len(whitened))
+    return _remembered(found, pairs, nominal, hidden, dataset)
+
+
+def _answers(dataset: Dataset) -> bool:
+    """Return whether commands answer what happens: given twice, they are not quite the same."""
+    by_name = {each.name: each for each in dataset.trajectories}
+    return any(
+        difference(by_name[each.repeats], each) > _SAME
+        for each in dataset.trajectories
+        if each.repeats
+    )
+
+
+def _remembered(
+    noise: Noise, pairs: Sequence[Difference], nominal: Rollouts | None, rounding: Float64,
+    dataset: Dataset,
+) -> Noise:  # fmt: skip
+    """Return the noise with how much of it is carried on, or how it grows.
+
+    Args:
+        noise: its floor.
+        pairs: what repeats differ by.
+        nominal: the arm; None for one that is held by its joints.
+        rounding: float64[J], what an encoder's steps hide, in noise floors.
+        dataset: the recordings.
+    """
+    joints: list[Float64] = []
+    tracker: list[Float64] = []
+    for each in pairs:
+        whiten = None if nominal is None else noise.whitening(nominal, each.q)
+        joints += _split(noise.floors(each.joints, whiten), each.joints_parts)
+        if noise.tracker is None or each.tracker is None or each.tracker_parts is None:
+            continue
+        tracker += _split(each.tracker / noise.tracker, each.tracker_parts)
+    no_steps = np.zeros(0 if noise.tracker is None else len(noise.tracker))
+    if nominal is not None and nominal.plant.control == "torque":
+        drift = drift_of(joints, _OF_PAIR, rounding)
+        seen = drift_of(tracker, _OF_PAIR, no_steps) if tracker else None
+        if drift is not None and (noise.tracker is None or seen is not None):
+            blocks = max(len(each) for each in joints)
+            grown = noise.growing(drift if seen is None else drift.beside(seen), blocks)
+            # Where commands answer the noise, what is new goes with them.
+            return replace(grown, memory=None) if _answers(dataset) else grown
+    found = memory_of(joints, _OF_PAIR, rounding)
+    if noise.tracker is not None:
+        found = found.beside(memory_of(tracker, _OF_PAIR, no_steps))
+    return replace(noise, memory=found)
+
+
+def _split(values: Float64, parts: Integers) -> list[Float64]:
+    """Return the rows of each part by themselves."""
+    return np.split(values, np.flatnonzero(np.diff(parts)) + 1)
+
+
+def repeat_differences(
+    dataset: Dataset, block: float, starts: Starts, cut: Cut | None = None
+) -> list[Difference]:
+    """Return what repeats differ by.
+
+    The variance of a difference is twice that of the noise. What follows from where they started
+    is taken off.
+    """
+    by_name = {each.name: each for each in dataset.trajectories}
+    return [
+        _difference(by_name[each.repeats], each, block, starts, cut)
+        for each in dataset.trajectories
+        if each.repeats
+    ]
+
+
+def _difference(
+    first: Trajectory, second: Trajectory, block: float, starts: Starts, cut: Cut | None
+) -> Difference:
+    spans = np.zeros((0, 2)) if cut is None else spans_of(first, cut)
+
+    def parts_of(at: Float64, count: int) -> Integers:
+        times = block_means(at, at[:, None], block)[:count, 0]
+        return np.searchsorted(spans[:, 0], times, side="right")
+
+    joints = block_means(first.joints_at, _against(first, second, starts), block)
+    q = block_means(first.joints_at, first.q, block)[: len(joints)]
+    is_known = np.isfinite(joints).all(axis=1)
+    parts = parts_of(first.joints_at, len(joints))[is_known]
+    found = Difference(joints[is_known], None, q[is_known], parts, None)
+    if first.tracker_at is None or second.tracker_at is None:
+        return found
+    tracker = block_means(first.tracker_at, _tracker_against(first, second, starts), block)
+    is_known = np.isfinite(tracker).all(axis=1)
+    parts = parts_of(first.tracker_at, len(tracker))[is_known]
+    return replace(found, tracker=tracker[is_known], tracker_parts=parts)
+
+
+def _against(first: Trajectory, second: Trajectory, starts: Starts) -> Float64:
+    at = first.joints_at
+    inside = at <= second.joints_at[-1]
+    out = first.q - sampled(second.joints_at, second.q, at)
+    if (apart := starts.get(second.name)) is not None:
+        out = out - apart.joints
+    return out[inside] if inside.sum() > _FEWEST else out
+
+
+def _tracker_against(first: Trajectory, second: Trajectory, starts: Starts) -> Float64:
+    assert first.tracker_at is not None
+    assert first.tracker is not None
+    assert second.tracker_at is not None
+    assert second.tracker is not None
+    other = sampled_poses(second.tracker_at, second.tracker, first.tracker_at)
+    out = pose_error(first.tracker, other)
+    apart = starts.get(second.name)
+    if apart is not None and apart.tracker is not None:
+        out = out - apart.tracker
+    inside = first.tracker_at <= second.tracker_at[-1]
+    return out[inside] if inside.sum() > _FEWEST else out
+
+
+def _fast(at: Float64, values: Float64) -> Float64:
+    """Return what a local quadratic leaves: faster than the arm moves."""
+    width = min(_BAND, (len(at) - 1) // 2 * 2 - 1)
+    return values - smooth(values, max(width, 5))
+
+
+def block_means(at: Float64, values: Float64, block: float) -> Float64:
+    """Return float64[B, D]: means over blocks that follow each other from the first instant.
+
+    Args:
+        at: float64[T] (s), rising.
+        values: float64[T', D] of the first T' instants.
+        block: length (s); one without a reading is left out.
+    """
+    number = np.floor((at[: len(values)] - at[0]) / block + 1e-6).astype(np.int64)
+    starts = np.flatnonzero(np.r_[True, np.diff(number) > 0])
+    counts = np.diff(np.r_[starts, len(values)])[:, None]
+    return np.add.reduceat(values, starts, axis=0) / counts

@@ -1,0 +1,1 @@
+"""Looks for causes, round by round, and takes back what others make superfluous."""

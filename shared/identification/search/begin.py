@@ -1,0 +1,156 @@
+"""Begins a search: what the noise is, and the base fitted without any cause."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shared.identification.arm.subject import subject_of
+from shared.identification.dataset.types import Dataset
+from shared.identification.effect import Candidate, Effect
+from shared.identification.fitting.creep import creep_of, with_creep
+from shared.identification.fitting.fit import (
+    BaseFits,
+    Fit,
+    SavedFits,
+    fit_again,
+    fit_base,
+    fit_without,
+    floor_from_base,
+)
+from shared.identification.fitting.parameters import base_parameters, bends
+from shared.identification.fitting.problem import BLOCK, Problem
+from shared.identification.fitting.space import Space
+from shared.identification.gate.held_out import stretches
+from shared.identification.noise.floor import noise_of
+from shared.identification.progress import Progress
+from shared.identification.search.screen import candidates_of
+from shared.identification.search.searched import Search
+
+FAR_FROM_KNOWN = 3.0
+"""Standard deviations from what is known of a link at which the base itself is doubted."""
+
+
+def begin(
+    dataset: Dataset,
+    *,
+    seed: int,
+    progress: Progress,
+    without: frozenset[str],
+    catalogue: Sequence[Effect],
+    fits: SavedFits | None = None,
+) -> Search:
+    """Return a search with its base fitted.
+
+    Args:
+        dataset: the recordings.
+        seed: of everything random.
+        progress: is told how far it is.
+        without: effects to leave out, by name.
+        catalogue: what is looked for.
+        fits: the base's fit, if it was found before.
+
+    Raises:
+        IdentificationError: the model does not fit the recordings.
+    """
+    rng = np.random.default_rng(seed)  # of the base fit, which may have been done before
+    progress("noise floor", 0.0)
+    subject = subject_of(dataset)
+    noise = noise_of(dataset, BLOCK, subject.starts, subject.nominal)
+    released = known = base_parameters(subject)
+    creep = creep_of(subject)
+    if fits is not None and not {each.name for each in (*known, *creep)} >= set(fits.names):
+        fits = None
+    problem = Problem(subject, dataset, known, noise)
+    if not noise.is_measured:
+        progress("noise floor", 0.5, "no repeats: from what the base leaves")
+        noise = floor_from_base(Space(problem))
+    if fits is not None:
+        known = tuple(each for each in (*known, *creep) if each.name in fits.names)
+    problem = Problem(subject, dataset, known, noise)
+    progress("base fit", 0.0, f"{len(known)} parameters" + ("" if fits is None else ", kept"))
+    space = Space(problem)
+    done = with_creep(fit_base(space, rng), creep) if fits is None else fit_again(space, fits)
+    problem = done.whole.space.problem
+    if fits is None and (doubted := doubted_of(done.whole)):
+        # What is known of a link does not hold, so the base may not bend it: what is wrong there
+        # is looked for like any other cause.
+        bent = ", ".join(problem.parameters[index].name for index in doubted)
+        progress("base fit", 0.5, f"without {bent}")
+        done = _held(done, doubted)
+        problem = done.whole.space.problem
+    candidates, ruled_out = candidates_of(catalogue, subject, without)
+    return begun_with(
+        done,
+        seed=seed,
+        candidates=candidates,
+        ruled_out=ruled_out,
+        doubted=tuple(each.name for each in released if each not in problem.parameters),
+    )
+
+
+def begun_with(
+    done: BaseFits,
+    *,
+    seed: int,
+    candidates: tuple[Candidate, ...],
+    ruled_out: dict[str, str],
+    doubted: tuple[str, ...],
+) -> Search:
+    """Return a search that has just begun, from fits of its base.
+
+    Args:
+        done: the fits.
+        seed: of everything random.
+        candidates: what is looked for.
+        ruled_out: effects that cannot be, and why.
+        doubted: parameters that were taken out of the base.
+    """
+    space = done.whole.space
+    problem, test = space.problem, space.problem.of("test")
+    losses = stretches(problem, space.variant(done.whole.z), test)
+    return Search(
+        problem=problem,
+        rng=np.random.default_rng([seed, 1]),
+        candidates=candidates,
+        ruled_out=ruled_out,
+        doubted=doubted,
+        base=done.whole,
+        nominal=done.nominal,
+        parts=done.parts,
+        current=done.whole,
+        nominal_losses=stretches(problem, space.variant(np.zeros(space.size)), test),
+        base_losses=losses,
+        current_losses=losses,
+    )
+
+
+def begin_without(found: Search, gone: Sequence[int], *, seed: int) -> Search:
+    """Return a search that has just begun, as another one whose base may not bend so much.
+
+    Args:
+        found: the other one, just begun.
+        gone: which of its base's parameters stay as the model file has them.
+        seed: of everything random.
+    """
+    known = found.problem.parameters
+    return begun_with(
+        _held(BaseFits(found.nominal, found.parts, found.base), gone),
+        seed=seed,
+        candidates=found.candidates,
+        ruled_out=found.ruled_out,
+        doubted=(*found.doubted, *(known[index].name for index in gone)),
+    )
+
+
+def _held(done: BaseFits, gone: Sequence[int]) -> BaseFits:
+    """Return a base's fits with some of its parameters as the model file has them."""
+    problem = done.whole.space.problem
+    kept = tuple(each for index, each in enumerate(problem.parameters) if index not in gone)
+    return fit_without(Space(replace(problem, parameters=kept)), done, gone)
+
+
+def doubted_of(fit: Fit) -> list[int]:
+    """Return which parameters a fit bends further than what is known of them allows."""
+    off = np.abs(bends(fit.space.problem.parameters, fit.z))
+    return [int(index) for index in np.flatnonzero(off > FAR_FROM_KNOWN)]

@@ -1,0 +1,123 @@
+"""Looks at candidates and refits the best roughly: from the base's fit, and from the nominal model.
+
+A base that lacks a large cause is bent so far towards it that nearby the cause does not show: a
+forearm whose torque is limited to a quarter was fitted with ten times its inertia, and what was
+then missing looked like a friction. Seen from the nominal model it comes first.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from shared.identification.effect import Candidate
+from shared.identification.fitting.fit import Fit, Start
+from shared.identification.fitting.refit import Rough, refit, refit_late
+from shared.identification.fitting.turns import LATE
+from shared.identification.progress import Progress
+from shared.identification.search.screen import Screened, Seen, screen
+from shared.identification.search.windows import closer
+
+_TRIED = 6
+"""Candidates that are refitted with the base's derivative kept."""
+_MORE = 2
+"""Further ones that only the nominal model shows."""
+_PER_EFFECT = 3
+"""Places of one effect among those tried."""
+_SLIGHT = 0.015
+"""Of the training residual: what explains less at first sight is not refitted."""
+_SURELY = 12.0
+"""Squares of a standard error that it is at least, where the noise is known to be white."""
+_SLIGHT_BESIDE = 0.1
+"""The same, as a share of what the best one explains."""
+_ONCE_BESIDE = 0.3
+"""The same of what happened once: a law that the model lacks looks like pushes where it is most."""
+
+
+def look(
+    fit: Fit, nominal: Start, candidates: Sequence[Candidate], is_far: bool, progress: Progress,
+    is_calm: bool = False, is_hopeless: Callable[[Screened], bool] = lambda one: False,
+    seen: Seen | None = None,
+) -> tuple[list[Screened], list[Rough]]:  # fmt: skip
+    """Return what every candidate could explain, best first, and rough refits of the best.
+
+    Args:
+        fit: the base's, with the causes that were accepted before.
+        nominal: the derivative at the nominal model, of the base alone.
+        candidates: what is looked for.
+        is_far: whether so much is left that the base may be bent.
+        progress: is told how far it is.
+        is_calm: whether nothing stands out that may have happened once; no such candidate is
+            refitted then, nor looked at beside a cause.
+        is_hopeless: says of a candidate that it has no prospect of passing: it is not refitted.
+        seen: how candidates changed the residual when they were first looked at.
+    """
+    segments = fit.space.problem.of("train")
+    if is_calm and fit.space.candidates:
+        candidates = [each for each in candidates if each.recording is None]
+    progress("screen", 0.0, f"{len(candidates)} candidates")
+    screened = screen(fit, candidates, segments, seen)
+    slight = _slight(fit)
+    refitted = [each for each in screened if not is_calm or each.candidate.recording is None]
+    picked = [(each, fit) for each in _diverse(refitted, slight) if not is_hopeless(each)]
+    picked = [
+        (closer(fit, each, segments) if each.candidate.recording else each, fit)
+        for each, _ in picked
+    ]
+    if is_far:
+        progress("screen", 0.5, "again, from the nominal model")
+        far = Fit.at(fit.space, np.r_[nominal.z, fit.z[nominal.z.size :]], segments)
+        known = {each.candidate for each, _ in picked}
+        new = [
+            each
+            for each in _diverse(screen(far, candidates, segments), slight)
+            if each.candidate not in known and each.candidate.recording is None
+        ]
+        picked += [(each, far) for each in new[:_MORE]]
+    found: list[Rough] = []
+    for index, (each, begun) in enumerate(picked):
+        progress("refit", index / len(picked), each.candidate.label)
+        found.append(refit(fit, nominal, each, segments, begun))
+    found.sort(key=lambda entry: entry.ratio)
+    return screened, _of_turns(found, screened, fit, segments)
+
+
+def _of_turns(
+    found: list[Rough], screened: Sequence[Screened], fit: Fit, segments: tuple[int, ...]
+) -> list[Rough]:
+    """Return refits, best first, with that of an interval if a delay like its mean is the best."""
+    if not found:
+        return found
+    best = found[0].screened.candidate
+    for each in screened:
+        name = each.candidate.effect.name
+        if LATE.get(name) != best.effect.name or each.candidate.place != best.place:
+            continue
+        late = refit_late(found[0], each, fit, segments)
+        before = [one for one in found if one.screened.candidate == each.candidate]
+        others = [one for one in found if one.screened.candidate != each.candidate]
+        better = min([late, *before], key=lambda one: one.ratio)
+        return sorted([*others, better], key=lambda one: one.ratio)
+    return found
+
+
+def _slight(fit: Fit) -> float:
+    """Return which share of the training residual is too little to be looked at."""
+    is_white = fit.space.problem.noise.memory is not None
+    return min(_SLIGHT, _SURELY / len(fit.residual)) if is_white else _SLIGHT
+
+
+def _diverse(screened: Sequence[Screened], slight: float = _SLIGHT) -> list[Screened]:
+    """Return the best few, not all of one effect; what happened once takes nobody's place."""
+    counts: dict[str, int] = {}
+    out: list[Screened] = []
+    lasting = 0
+    for each in screened:
+        name, is_once = each.candidate.effect.name, each.candidate.recording is not None
+        counts[name] = counts.get(name, 0) + 1
+        beside = _ONCE_BESIDE if is_once else _SLIGHT_BESIDE
+        is_slight = each.share < max(slight, beside * screened[0].share)
+        if counts[name] > _PER_EFFECT or is_slight or (lasting == _TRIED and not is_once):
+            continue
+        out.append(each)
+        lasting += not is_once
+    return out

@@ -1,0 +1,51 @@
+"""Says beforehand which candidates have no prospect of passing, so that nobody pays for a refit.
+
+Where little more than noise is left, every candidate is small, and what the screen expects of it is
+about where a refit ends. So what was held out can be asked before: a candidate that it does not
+follow at all, and whose expected size takes nothing off its loss, is not refitted. That only leaves
+candidates out; what passes is judged as ever.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from shared.identification.gate.held_out import stretches
+from shared.identification.search.screen import Screened
+from shared.identification.search.searched import Search, held_of
+
+_SMALL = 0.02
+"""Share of the training residual up to which what the screen expects is about what comes."""
+_FOLLOWED = 1.0
+"""Standard errors by which held-out residuals follow what has a prospect; 1.65 are to pass."""
+_GAINS = 0.01
+"""Of the held-out loss, that has a prospect all the same; 0.04 at least are to pass."""
+
+
+def hopeless(found: Search) -> Callable[[Screened], bool]:
+    """Return what says of a candidate that was looked at that it has no prospect of passing.
+
+    Args:
+        found: the search so far.
+    """
+    if found.problem.noise.memory is None or not found.parts.is_near_noise:
+        return lambda one: False
+    return lambda one: _is_hopeless(found, one)
+
+
+def _is_hopeless(found: Search, one: Screened) -> bool:
+    problem, current = found.problem, found.current
+    quantities = one.candidate.effect.quantities(problem.subject, one.candidate.place)
+    if one.candidate.recording is not None or one.share > _SMALL:
+        return False
+    if any(each.phase or not each.is_smooth for each in quantities):
+        return False  # where it acts only from some size on, what is small there is not elsewhere
+    space = current.space.grown(one.candidate)
+    expected = space.clip(np.r_[current.z + one.shift, one.start])
+    losses = stretches(problem, space.variant(expected), problem.of("test"))
+    before = float(found.current_losses.mean())
+    if before - float(losses.mean()) > _GAINS * before:
+        return False
+    # What the base makes up for is taken out there: it need not go along.
+    alone = space.variant(space.clip(np.r_[current.z, one.start]))
+    return held_of(found, current).follow(current.variant, alone).errors < _FOLLOWED

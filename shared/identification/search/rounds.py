@@ -1,0 +1,339 @@
+"""Searches for causes: looks, tries, and judges each on what was held out."""
+
+import numpy as np
+
+from shared.identification.dataset.types import Float64
+from shared.identification.effect import Candidate
+from shared.identification.fitting.fit import Fit, go_down, polish
+from shared.identification.fitting.parameters import bends
+from shared.identification.fitting.refit import settle
+from shared.identification.fitting.space import Space
+from shared.identification.fitting.turns import LATE
+from shared.identification.gate.certainty import is_there
+from shared.identification.gate.held_out import (
+    LEAST_SHARE,
+    compare,
+    floor_of,
+    plain_stretches,
+    stretches,
+)
+from shared.identification.progress import Progress
+from shared.identification.search.family import Family, look_elsewhere, relatives
+from shared.identification.search.fewer import one_for_many, prune, tell_apart
+from shared.identification.search.look import look
+from shared.identification.search.outlook import hopeless
+from shared.identification.search.screen import Screened
+from shared.identification.search.searched import (
+    ALIKE,
+    NEARLY_NOISE,
+    STANDS_OUT,
+    TAKEN_AWAY,
+    Model,
+    Search,
+    Tried,
+    cosine,
+    is_open,
+    judged,
+    plain_losses_of,
+    so_far,
+)
+
+_ROUNDS = 4
+"""Each names one cause, and what is like it at other joints."""
+_FULL = 4
+"""Candidates that get a full fit, of those refitted roughly."""
+_FAR_OFF = 10.0
+"""Mean square residual, in noise floors, from which the base may be bent out of sight."""
+_FAR = 2.0
+"""Candidates whose rough refit costs so many times the best one's get no full fit."""
+QUIET = 1.25
+"""Mean square residual, in noise floors, below which no further cause is looked for."""
+_EVENT = 4.0
+"""Times the mean square residual of the usual stretch that one counts with at most, between causes:
+what happened once would be most of the mean, and most of its error."""
+_NEARLY = 0.05
+"""Of the cost on what was fitted to: by so much two causes that hardly differ may be apart."""
+_APART = 0.5
+"""Cosine of what two causes explain, up to which three quarters of it are not the same."""
+_BENT = 15.0
+"""By so much more, as part of the cost, no cause may have links bent than one that does as well."""
+_LOADS = {"counterbalance", "torque_bias", "gravity_tilt", "joint_spring"}
+"""Causes of which none is told from the others by a few postures: near one of them a load that
+depends on posture is a constant torque, whatever numbers either has."""
+_LEANS = {"encoder_offset", "payload"}
+"""A tool that is heavy beside its middle hangs as one does at a joint of which the encoder has
+another zero; what a payload's shape adds to that is not modelled."""
+
+
+def search(found: Search, progress: Progress) -> None:
+    """Look for causes, one after another, until none passes or one is not told from others."""
+    train, test = found.problem.of("train"), found.problem.of("test")
+    for _ in range(_ROUNDS):
+        is_over = found.accepted and _is_over(found)
+        if is_over or not _round(found, train, test, progress):
+            break
+    if found.accepted:
+        tell_apart(found, train, test)
+        prune(found, train, test)
+    if len(found.accepted) > 1:
+        one_for_many(found, train, test)
+
+
+def _is_over(found: Search) -> bool:
+    """Return whether nothing is left that a cause could be named for.
+
+    It is not told from noise or, where that was not measured, all of it is less than what a cause
+    must take off to be of use.
+    """
+    if found.problem.noise.is_measured:
+        return _is_quiet(found, so_far(found))
+    left, base = float(found.current_losses.mean()), float(found.base_losses.mean())
+    return left < LEAST_SHARE * (base - floor_of(base))
+
+
+def _goes_on(found: Search) -> bool:
+    """Return whether so much is left that what is not told apart may be neither."""
+    return is_open(found) if found.problem.noise.is_measured else not _is_over(found)
+
+
+def _is_quiet(found: Search, model: Model) -> bool:
+    """Return whether what a model leaves is not told from noise, where that was measured.
+
+    Neither what is new in each block, nor what is slow.
+    """
+    if not found.problem.noise.is_measured or model.losses.mean() >= QUIET:
+        return False
+    return bool(plain_losses_of(found.problem, model).mean() < QUIET)
+
+
+def _round(
+    found: Search, train: tuple[int, ...], test: tuple[int, ...], progress: Progress
+) -> bool:
+    """Look for one more cause; return whether there was one."""
+    taken = {each.candidate for each in found.accepted}
+    left = [each for each in found.candidates if each not in taken]
+    if not left:
+        return False
+    is_measured = found.problem.noise.is_measured
+    is_far = not is_measured or float(found.current_losses.mean()) > _FAR_OFF
+    now = found.current.variant
+    before = plain_stretches(found.problem, now, train)
+    is_calm = float(before.max()) <= _usually(before)
+    screened, roughly = look(
+        found.parts, found.nominal, left, is_far, progress, is_calm, hopeless(found), found.seen
+    )
+    for each in screened:
+        found.screened.setdefault(each.candidate.label, each)
+    tried: list[Tried] = []
+    for each in roughly[:_FULL]:
+        if each.ratio > min(1 - 1e-3, _FAR * roughly[0].ratio + 0.02):
+            break
+        progress("decide", len(tried) / _FULL, each.screened.candidate.label)
+        space = Space(found.problem, each.space.candidates)
+        fit = settle(space, each.z, train, found.current)
+        is_event = _explains_event(each.screened.candidate, before, fit, train)
+        tried.append(_tried(found, each.screened, fit, is_event))
+    for one in tried:
+        found.tried.setdefault(one.candidate.label, one)
+    base = float(found.base_losses.mean())
+    useful = [one for one in tried if one.is_event or one.gain.is_useful(base)]
+    if not useful:
+        return False
+    best, rivals = _simplest(_sure(useful, train), found.rng)
+    rivals = tuple(one for one in rivals if _is_rival(found, best, one, train, test))
+    begun = go_down(best.fit, train)  # with the derivative that it has
+    fit = polish(best.fit.space, begun.z, train, 4, enough=1e-4)
+    final = _tried(found, best.screened, fit, best.is_event)
+    if final.gain.loss <= best.gain.loss and (best.is_event or final.gain.is_useful(base)):
+        best = final
+    best, rivals, family = _elsewhere(found, best, rivals, train, test, progress)
+    found.accepted.append(best)
+    found.rivals.append(rivals)
+    found.current, found.current_losses = best.fit, best.losses
+    if family is not None:
+        _join(found, family)
+    if rivals and not _goes_on(found):
+        return False
+    if found.parts.space.problem is found.problem:
+        found.parts = found.current
+    else:
+        space = Space(found.parts.space.problem, found.current.space.candidates)
+        found.parts = polish(space, found.current.z, space.problem.of("train"), 2)
+    return True
+
+
+def _tried(found: Search, screened: Screened, fit: Fit, is_event: bool) -> Tried:
+    """Return a candidate's fit, judged beside what there is so far."""
+    losses = stretches(found.problem, fit.variant, found.problem.of("test"))
+    gain, fitted, foretold = judged(found, screened.candidate, so_far(found), Model(fit, losses))
+    return Tried(screened, fit, gain, losses, is_event, fitted=fitted, foretold=foretold)
+
+
+def _elsewhere(
+    found: Search, best: Tried, rivals: tuple[Tried, ...], train: tuple[int, ...],
+    test: tuple[int, ...], progress: Progress,
+) -> tuple[Tried, tuple[Tried, ...], Family | None]:  # fmt: skip
+    """Look at other joints for the cause to be taken, and for those that are not told from it.
+
+    Returns:
+        The cause to take, its rivals, and what is like it at other joints, which may tell it from
+        what were its rivals.
+    """
+    if _is_quiet(found, Model(best.fit, best.losses)):
+        return best, rivals, None
+    families: list[tuple[Tried, Family]] = []
+    for one in (best, *rivals):
+        others = relatives(found.candidates, one.candidate, one.fit)
+        if not others:
+            continue
+        progress("refit", 1.0, f"{one.candidate.effect.name} at {len(others)} other joints")
+        family = look_elsewhere(one.fit, others, one.losses, train, test, found.rng)
+        if family is not None:
+            families.append((one, family))
+    if not families:
+        return best, rivals, None
+    taken, family = min(families, key=lambda each: float(each[1].losses.mean()))
+    after = {one.candidate: one.losses for one in (best, *rivals)}
+    after |= {one.candidate: other.losses for one, other in families}
+    left = tuple(
+        one
+        for one in (best, *rivals)
+        if one is not taken
+        and compare(after[one.candidate], family.losses, found.rng).surely <= 0.0
+    )
+    return (best, rivals, None) if left else (taken, (), family)
+
+
+def _join(found: Search, family: Family) -> None:
+    """Take what was found at other joints."""
+    for candidate, gain in family.gains.items():
+        screened = found.screened[candidate.label]
+        found.accepted.append(Tried(screened, family.fit, gain, family.losses, is_relative=True))
+        found.tried[candidate.label] = found.accepted[-1]
+        found.rivals.append(())
+    found.current, found.current_losses = family.fit, family.losses
+
+
+def _explains_event(
+    candidate: Candidate, before: Float64, fit: Fit, train: tuple[int, ...]
+) -> bool:
+    """Return whether a cause that is in one recording takes away what stands out there.
+
+    Held-out recordings cannot show what happened once in another one. What stands out must be far
+    over everything else, more than noise that is the same throughout would ever be.
+
+    Args:
+        candidate: the cause.
+        before: float64[S], plain losses of stretches without it, of what was fitted to.
+        fit: with it.
+        train: recordings to fit to.
+    """
+    if candidate.recording is None:
+        return False
+    after = plain_stretches(fit.space.problem, fit.variant, train)
+    worst = int(np.argmax(before - after))
+    most = _usually(before)
+    return bool(
+        before[worst] > most
+        and after[worst] < TAKEN_AWAY * before[worst]
+        and after.max() < max(TAKEN_AWAY * before.max(), most)
+    )
+
+
+def _usually(losses: Float64) -> float:
+    """Return what a stretch in which nothing happened leaves at most."""
+    return STANDS_OUT * max(float(np.median(losses)), 1.0)
+
+
+def _sure(useful: list[Tried], train: tuple[int, ...]) -> list[Tried]:
+    """Return what is surely more than nothing, or all if nothing is, as of two causes by half.
+
+    A spring of no surely known stiffness, whose rest is far off, is a constant torque.
+    """
+    return [
+        one for one in useful if one.is_event or is_there(one.fit, one.candidate, train)
+    ] or useful
+
+
+def _simplest(useful: list[Tried], rng: np.random.Generator) -> tuple[Tried, tuple[Tried, ...]]:
+    """Return the cause to take, and those that are not told from it.
+
+    Each has passed by what was held out; which of them does best, all recordings say. A stretch in
+    which something large happened has no more of a say than ``_EVENT`` usual ones. Where hardly
+    more than noise is left, it is what the base could not make up for of what was held out; where
+    much is, that would be most of what tells one large cause from another. Of what does as well as
+    the best one, and has links bent no further for it, the simplest is taken; what needs more
+    numbers to do no better is no rival, unless it is in the nature of both that they are hardly
+    told apart.
+    """
+    is_apart = all(one.gain.apart is not None and one.gain.before < NEARLY_NOISE for one in useful)
+    most = _EVENT * min(float(np.median(one.everywhere(is_apart))) for one in useful)
+    left = {one.candidate: np.minimum(one.everywhere(is_apart), most) for one in useful}
+    best = min(useful, key=lambda one: left[one.candidate].mean())
+    alike = [one for one in useful if one is best or _is_alike(best, one, left, rng)]
+    bent = {one.candidate: _bent_by(one.fit) for one in alike}
+    alike = [one for one in alike if bent[one.candidate] - min(bent.values()) <= _BENT]
+    fewest = min(one.numbers for one in alike)
+    simple = [one for one in alike if one.numbers == fewest]
+    taken = min(simple, key=lambda one: left[one.candidate].mean())
+    others = [one for one in useful if one is not taken]
+    as_simple = {one.candidate for one in simple}
+    return taken, tuple(
+        one for one in others if one.candidate in as_simple or _is_nearly(taken, one, is_apart, rng)
+    )
+
+
+def _bent_by(fit: Fit) -> float:
+    """Return what speaks against the links of a fit's base, as part of the cost."""
+    return 0.5 * float(np.sum(bends(fit.space.problem.parameters, fit.z) ** 2))
+
+
+def _is_nearly(taken: Tried, other: Tried, is_apart: bool, rng: np.random.Generator) -> bool:
+    """Return whether another cause hardly differs from what is taken, in nature and in these data.
+
+    Both of the recordings that were fitted to and of those that were held out.
+    """
+    name, of_taken = other.candidate.effect.name, taken.candidate.effect.name
+    leans = {name, of_taken} == _LEANS
+    if not leans and LATE.get(name) != of_taken and not {name, of_taken} <= _LOADS:
+        return False
+    margin = compare(other.held(is_apart), taken.held(is_apart), rng)
+    least = max(margin.error, ALIKE * taken.gain.gain if leans else 0.0)
+    return margin.gain < least and other.fit.cost <= (1 + _NEARLY) * taken.fit.cost
+
+
+def _is_alike(
+    best: Tried, other: Tried, left: dict[Candidate, Float64], rng: np.random.Generator
+) -> bool:
+    """Return whether the recordings do not prefer the best surely."""
+    margin = compare(left[other.candidate], left[best.candidate], rng)
+    return margin.gain < max(margin.error, ALIKE * best.gain.gain)
+
+
+def _is_rival(
+    found: Search, best: Tried, other: Tried, train: tuple[int, ...], test: tuple[int, ...]
+) -> bool:
+    """Return whether a cause that does as well may stand in the place of the best.
+
+    Not one that explains something else as well, friction of another joint: that is a cause beside
+    it, to be found in its turn.
+    """
+    if other.candidate.effect.name in LATE:
+        return True
+    return cosine(best, other) > _APART and not _adds(found, best, other, train, test)
+
+
+def _adds(
+    found: Search, best: Tried, other: Tried, train: tuple[int, ...], test: tuple[int, ...]
+) -> bool:
+    """Return whether a rival is a cause beside the best: together they do surely better.
+
+    Two joints of one chain that both rub: friction of either imitates most of the other's.
+    """
+    space = best.fit.space.grown(other.candidate)
+    size = other.numbers
+    starts = [np.r_[best.fit.z, share * other.fit.z[-size:]] for share in (0.5, 0.1)]
+    fits = [settle(space, space.clip(start), train) for start in starts]
+    fit = min(fits, key=lambda one: one.cost)
+    losses = stretches(found.problem, space.variant(fit.z), test)
+    return compare(best.losses, losses, found.rng).is_useful(float(found.base_losses.mean()))

@@ -1,0 +1,341 @@
+"""A search while it goes on: what was looked at and tried, what was taken, and what judges it."""
+
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from shared.identification.dataset.types import Float64
+from shared.identification.effect import Candidate
+from shared.identification.fitting.fit import Fit, Start
+from shared.identification.fitting.problem import Problem, Variant
+from shared.identification.gate.certainty import sureness
+from shared.identification.gate.foretold import SURELY, Foretold, Held
+from shared.identification.gate.held_out import Gain, Taken, compare, plain_stretches
+from shared.identification.gate.left_out import left_out
+from shared.identification.search.screen import Screened, Seen
+
+ALIKE = 0.02
+"""Of a cause's gain: what does as well within this is not told from it."""
+NEARLY_NOISE = 1.4
+"""Mean square residual below which nothing worth a name is left."""
+BESIDE_A_NAME = 1.7
+"""The same beside a cause that passed."""
+MAY_BE_LEFT = 0.08
+"""Share of the base fit's mean square residual that named causes may leave where that is more:
+what is far larger than the noise is never modelled to the last digit."""
+BESIDE_A_DOUBT = 10.0
+"""The most that it may be where the base itself is doubted: more than that may hide anything."""
+STANDS_OUT = 6.0
+"""Mean square residual of a stretch over the usual one, where something happened once."""
+TAKEN_AWAY = 0.4
+"""Share of it that may be left by what explains it."""
+
+
+_PLAINLY, _PLAINLY_EACH = 20.0, 4.0
+"""Twice what a cause takes off the cost, at least, and more for each of its numbers: of a hundred
+candidates where there is none, the best takes off some 15."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A candidate that was refitted."""
+
+    screened: Screened
+    fit: Fit
+    gain: Gain
+    losses: Float64
+    """float64[S] of held-out stretches."""
+    is_event: bool = False
+    """Whether it happened once, in a recording that was fitted to, and explains what stood out."""
+    is_relative: bool = False
+    """Whether it was found at a joint because most others have it."""
+    fitted: Float64 = field(default_factory=lambda: np.empty(0))
+    """float64[R] of stretches of what was fitted to, with sizes in which they have no say."""
+    foretold: Foretold | None = None
+    """How what was held out follows it, where that was asked."""
+
+    @property
+    def candidate(self) -> Candidate:
+        """Return which."""
+        return self.screened.candidate
+
+    def held(self, is_apart: bool = False) -> Float64:
+        """Return float64[S], what it leaves of what was held out.
+
+        Args:
+            is_apart: without what the base could make up for there.
+        """
+        return self.foretold.after if is_apart and self.foretold is not None else self.losses
+
+    def everywhere(self, is_apart: bool = False) -> Float64:
+        """Return float64[S + R], what it leaves of all recordings."""
+        return np.concatenate([self.held(is_apart), self.fitted])
+
+    @property
+    def numbers(self) -> int:
+        """Return how many numbers the effect has."""
+        return len(self.screened.start)
+
+
+def cosine(one: Tried, other: Tried) -> float:
+    """Return how much of what two causes explain is the same, without what the base could."""
+    first, second = one.screened.signature, other.screened.signature
+    if first.size == 0 or second.size == 0:
+        return 0.0
+    return abs(float(first @ second))
+
+
+@dataclass(frozen=True)
+class Otherwise:
+    """Causes that do as well as the base alone, beside a base near the model file (``bent.py``)."""
+
+    base: Fit
+    """Far from the model file, though what is known of that counts."""
+    tried: tuple[Tried, ...]
+    """Best first."""
+    alike: float
+    """Smallest cosine between what the base explains by going far, and what they explain."""
+
+
+class ByAll(NamedTuple):
+    """Mean square residuals of a model fitted to all recordings, in noise floors.
+
+    Of those that were fitted to before or of the others, whichever is more.
+    """
+
+    new: float
+    """Of what is new in each block."""
+    plain: float
+    """As they are."""
+
+
+class Left(NamedTuple):
+    """Mean square residuals of what nothing was fitted to, in noise floors."""
+
+    nominal: float
+    base: float
+    current: float
+    by_all: float | None
+
+
+@dataclass
+class Search:
+    """A search while it goes on, and what it found."""
+
+    problem: Problem
+    rng: np.random.Generator
+    candidates: tuple[Candidate, ...]
+    ruled_out: dict[str, str]
+    doubted: tuple[str, ...]
+    """Parameters that were taken out of the base because they went further than is believable."""
+    base: Fit
+    """Without any cause, on whole recordings."""
+    nominal: Start
+    """Where refits begin a second time."""
+    parts: Fit
+    """With what was accepted, on short parts: where is looked."""
+    current: Fit
+    """The same on whole recordings: where is judged."""
+    nominal_losses: Float64
+    base_losses: Float64
+    current_losses: Float64
+    seen: Seen = field(default_factory=Seen)
+    """How candidates changed the residual in the first round."""
+    screened: dict[str, Screened] = field(default_factory=dict[str, Screened])
+    """Every candidate's best, from the first round."""
+    tried: dict[str, Tried] = field(default_factory=dict[str, Tried])
+    accepted: list[Tried] = field(default_factory=list[Tried])
+    rivals: list[tuple[Tried, ...]] = field(default_factory=list[tuple[Tried, ...]])
+    """For each accepted cause, what the data do not tell from it."""
+    otherwise: Otherwise | None = None
+    """Where nothing was accepted, what does as well as the base alone."""
+    final: Fit | None = None
+    """The current model fitted to all recordings, for sizes; nothing is judged by it."""
+    fitted_to: tuple[int, ...] = ()
+    """Segments of the final fit."""
+    held: Held | None = None
+    """Held-out recordings, as they were last looked at."""
+    by_all: ByAll | None = None
+    """What the current model leaves once it is fitted to all recordings; None where it was not
+    asked."""
+
+    @property
+    def left(self) -> Left:
+        """Return how much is left of what is new in each block: there small causes show."""
+        return Left(
+            float(self.nominal_losses.mean()), float(self.base_losses.mean()),
+            float(self.current_losses.mean()), None if self.by_all is None else self.by_all.new,
+        )  # fmt: skip
+
+    @property
+    def plainly(self) -> Left:
+        """Return how much is left as it is: what is slow and wrong shows in that."""
+        nominal, base, current = (float(each.mean()) for each in plain_losses(self))
+        return Left(nominal, base, current, None if self.by_all is None else self.by_all.plain)
+
+    @property
+    def told(self) -> Fit:
+        """Return the fit that sizes are told from."""
+        return self.current if self.final is None else self.final
+
+
+def is_open(found: Search) -> bool:
+    """Return whether more is left than a verdict that names causes, or none, may leave.
+
+    Links far from what is known of them say that the base is of another kind than the arm: what
+    takes much off then may be anything, so it has to take off nearly all. So may what only mends
+    what a base fit had spoiled, of motion unlike what it was fitted to. What goes once the model
+    may go by all recordings is only what those to fit to did not show of it.
+    """
+    return _is_much(found, found.left) or _is_much(found, found.plainly)
+
+
+def _is_much(found: Search, left: Left) -> bool:
+    least = min(left.current, np.inf if left.by_all is None else left.by_all)
+    if found.accepted:
+        if left.current >= left.nominal:
+            return True
+        most = BESIDE_A_DOUBT if found.doubted else np.inf
+        return least > max(BESIDE_A_NAME, min(MAY_BE_LEFT * left.base, most))
+    return least > NEARLY_NOISE
+
+
+def plain_losses(found: Search) -> tuple[Float64, Float64, Float64]:
+    """Return float64[S] of held-out stretches of the nominal model, the base and the current one.
+
+    Of plain residuals; those of the search where nothing is known of what noise carries on.
+    """
+    nothing = Variant(np.zeros(len(found.problem.parameters)))
+    base, current = Model(found.base, found.base_losses), so_far(found)
+    return (
+        _plain(found.problem, nothing, found.nominal_losses),
+        plain_losses_of(found.problem, base),
+        plain_losses_of(found.problem, current),
+    )
+
+
+def plain_losses_of(problem: Problem, model: "Model") -> Float64:
+    """Return float64[S] of one model's, the same."""
+    return _plain(problem, model.fit.variant, model.losses)
+
+
+def _plain(problem: Problem, variant: Variant, losses: Float64) -> Float64:
+    if problem.noise.memory is None:
+        return losses
+    return plain_stretches(problem, variant, problem.of("test"))
+
+
+class Model(NamedTuple):
+    """A fit, and what it leaves of what nothing was fitted to."""
+
+    fit: Fit
+    losses: Float64
+    """float64[S] of held-out stretches."""
+
+
+def so_far(found: Search) -> Model:
+    """Return what there is so far."""
+    return Model(found.current, found.current_losses)
+
+
+class Judged(NamedTuple):
+    """What speaks for a cause."""
+
+    gain: Gain
+    """On what was held out."""
+    fitted: Float64
+    """float64[R], see :class:`Tried`."""
+    foretold: Foretold | None
+    """The same."""
+
+
+def judged(found: Search, candidate: Candidate, before: Model, after: Model) -> Judged:
+    """Return what a cause takes off what was held out, and how sure that is.
+
+    All recordings make it surer, those that were fitted to with the size that the others give it;
+    what nothing was fitted to has to speak for it by more than its standard error all the same.
+    So it has to if a cause foretells what stands out there. Of what happened once in a recording
+    that was fitted to nothing is sure, see ``search.py``, nor of what explains that worse than
+    nothing does.
+    """
+    gain = compare(before.losses, after.losses, found.rng)
+    is_foretold = foretells(before.losses, after.losses)
+    more = left_out(before.fit, after.fit, candidate, found.problem.of("train"))
+    whole = compare(
+        np.concatenate([before.losses, more.before]),
+        np.concatenate([after.losses, more.after]),
+        found.rng,
+    )
+    beyond = gain.gain - gain.error
+    surely = max(gain.surely, beyond if is_foretold else min(whole.surely, beyond))
+    is_once = candidate.recording is not None
+    if is_once or after.fit.cost > before.fit.cost:
+        surely = -np.inf  # it only frees the base, or has bent it
+    foretold = None if is_once else _foretold(found, before.fit, after.fit)
+    if foretold is not None and foretold.is_refuted:
+        surely = -np.inf  # what goes there the base could do as well
+    gain = replace(
+        gain,
+        surely=surely,
+        is_measured=found.problem.noise.is_measured,
+        apart=_apart(found, candidate, after.fit, foretold),
+    )
+    return Judged(gain, more.after, foretold)
+
+
+def _foretold(found: Search, before: Fit, after: Fit) -> Foretold | None:
+    """Return how what was held out follows a cause, if what was fitted to speaks for it at all."""
+    if not _is_fitted(before, after):
+        return None
+    return held_of(found, before).follow(before.variant, after.variant)
+
+
+def _apart(
+    found: Search, candidate: Candidate, after: Fit, foretold: Foretold | None
+) -> Taken | None:
+    """Return what a cause takes off that what was held out surely follows, however little.
+
+    The surer that is, the less sure the recordings need to be that were fitted to, and the other
+    way round.
+    """
+    if foretold is None or not foretold.is_seen:
+        return None
+    fitted = sureness(after, candidate, found.problem.of("train"))
+    if fitted + foretold.errors < SURELY:
+        return None
+    before = float(foretold.before.mean())
+    return Taken(before, before - float(foretold.after.mean()))
+
+
+def held_of(found: Search, before: Fit) -> Held:
+    """Return held-out recordings without what a fit's base could make up for there."""
+    if found.held is None or found.held.fit is not before:
+        found.held = Held(before)
+    return found.held
+
+
+def _is_fitted(before: Fit, after: Fit) -> bool:
+    """Return whether what was fitted to speaks for a cause so plainly that the rest is asked."""
+    if before.space.problem.noise.memory is None:
+        return False
+    numbers = after.space.size - before.space.size
+    return 2.0 * (before.cost - after.cost) > _PLAINLY + _PLAINLY_EACH * numbers
+
+
+def foretells(before: Float64, after: Float64) -> bool:
+    """Return whether a cause takes away all that stands out of what nothing was fitted to.
+
+    A drive that reaches its limit in one swing is off in three stretches of twenty: resampled, they
+    are too few to be sure of. But by chance nothing of a size that other motion gave it does away
+    with what is many times the noise, at every moment of half a second.
+
+    Args:
+        before: float64[S], mean square residual of held-out stretches without the cause.
+        after: float64[S], with it.
+    """
+    most = STANDS_OUT * max(float(np.median(before)), 1.0)
+    there = before > most
+    if not there.any() or not bool(np.all(after[there] < TAKEN_AWAY * before[there])):
+        return False
+    return bool(after.max() < most)

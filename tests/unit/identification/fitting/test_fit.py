@@ -1,0 +1,141 @@
+"""Fits find what was planted."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shared.identification.arm.subject import recorded_of, subject_of
+from shared.identification.dataset.types import Dataset, ModelSource, Trajectory
+from shared.identification.fitting.cmaes import minimize
+from shared.identification.fitting.fit import (
+    BaseFits,
+    Fit,
+    Start,
+    _from_elsewhere,  # pyright: ignore[reportPrivateUsage]
+    _usual_power,  # pyright: ignore[reportPrivateUsage]
+    fit_without,
+    polish,
+)
+from shared.identification.fitting.parameters import base_parameters, enter_base
+from shared.identification.fitting.problem import Problem
+from shared.identification.fitting.space import Space
+from shared.identification.noise.floor import Noise
+from tests.arms import JOINTS, write_arm
+from tests.measured import measure, problem_of
+
+PLANTED = {
+    "damping elbow": 0.4, "armature lift": -0.3, "kp pan": 0.2, "kp lift": -0.15,
+    "friction_loss elbow": 0.5,
+}  # fmt: skip
+
+
+def planted(folder: Path) -> Problem:
+    """Return data without noise of an arm with another base, and what is fitted: no priors."""
+    blank = measure(folder, np.random.default_rng(0), seconds=3.0)
+    subject = subject_of(blank)
+    parameters = tuple(
+        replace(each, prior=np.inf) for each in base_parameters(subject) if each.name in PLANTED
+    )
+    x = np.array([PLANTED[each.name] for each in parameters])
+    found = subject.nominal.run(
+        [(lambda row: enter_base(parameters, x, row), each) for each in recorded_of(blank)]
+    )
+    trajectories = tuple(
+        replace(trajectory, q=reports.q, tracker=reports.tracker)
+        for trajectory, reports in zip(blank.trajectories, found, strict=True)
+    )
+    dataset: Dataset = replace(blank, trajectories=trajectories)
+    noise = Noise(np.full(3, 1e-4), np.full(6, 1e-4), np.zeros(9), is_measured=True)
+    return Problem(subject, dataset, parameters, noise)
+
+
+@pytest.mark.parametrize("begins_at_bound", [False, True])
+def test_a_planted_base_is_found_to_one_percent(tmp_path: Path, begins_at_bound: bool):
+    problem = planted(tmp_path)
+    space = Space(problem)
+    start = np.zeros(space.size)
+    names = [each.name for each in problem.parameters]
+    if begins_at_bound:
+        friction = names.index("friction_loss elbow")
+        start[friction] = space.bounds[0][friction]
+        assert problem.parameters[friction].value(start[friction]) == 0.0
+    fit = polish(space, start, problem.of("train"), enough=1e-9)
+    for each, z in zip(problem.parameters, fit.z, strict=True):
+        assert each.value(z) == pytest.approx(each.value(PLANTED[each.name]), rel=0.01), each.name
+
+
+def test_a_second_start_that_leads_to_the_first_fit_ends_there(tmp_path: Path):
+    problem = problem_of(measure(tmp_path, np.random.default_rng(0), seconds=3.0))
+    space, train = Space(problem), problem.of("train")
+    first = polish(space, np.zeros(space.size), train)
+    assert _from_elsewhere(space, np.full(space.size, 0.1), first, train) is first
+
+
+def test_a_second_start_that_finds_better_is_fitted_by_itself(tmp_path: Path):
+    problem = planted(tmp_path)
+    space, train = Space(problem), problem.of("train")
+    stuck = Fit.at(space, np.zeros(space.size), train)
+    found = _from_elsewhere(space, np.full(space.size, 0.1), stuck, train)
+    assert found is not stuck
+    assert found.cost < 0.01 * stuck.cost
+    np.testing.assert_allclose(found.jacobian, Fit.at(space, found.z, train).jacobian)
+
+
+def test_cmaes_finds_the_bottom_of_a_bowl_within_bounds():
+    wanted = np.array([0.3, -0.2, 2.0])
+
+    def losses(zs: np.ndarray) -> np.ndarray:
+        return np.sum((zs - wanted) ** 2, axis=1)
+
+    low, high = np.full(3, -1.0), np.ones(3)
+    found = minimize(losses, np.zeros(3), low, high, sigma=0.3, seed=4, generations=60)
+    again = minimize(losses, np.zeros(3), low, high, sigma=0.3, seed=4, generations=60)
+    assert found == pytest.approx([0.3, -0.2, 1.0], abs=0.02)
+    assert np.array_equal(found, again)
+
+
+def test_nothing_to_search_is_found_at_once():
+    empty = np.zeros(0)
+    assert minimize(lambda zs: zs.sum(axis=1), empty, empty, empty, sigma=0.3, seed=1).size == 0
+
+
+def test_what_is_taken_out_of_a_base_is_taken_out_of_the_derivative_at_the_nominal_model(
+    tmp_path: Path,
+):
+    problem = planted(tmp_path)
+    gone = [1, 3]
+    kept = tuple(each for index, each in enumerate(problem.parameters) if index not in gone)
+    full, space = Space(problem), Space(replace(problem, parameters=kept))
+    whole = polish(full, np.zeros(full.size), problem.of("train"), 1)
+    at_nominal = Start(np.zeros(full.size), full.jacobian(np.zeros(full.size), (0,))[1])
+    found = fit_without(space, BaseFits(at_nominal, whole, whole), gone)
+    _, wanted = space.jacobian(np.zeros(space.size), (0,))
+    assert found.nominal.jacobian == pytest.approx(wanted)
+    assert found.nominal.z == pytest.approx(np.zeros(space.size))
+    assert found.whole.cost > whole.cost
+
+
+def test_without_repeats_a_floor_under_torques_is_what_is_usual_block_by_block():
+    rng = np.random.default_rng(0)
+    growing = np.linspace(0.1, 3.0, 15)[:, None]
+    parts = [growing * rng.standard_normal((15, 2)) for _ in range(400)]
+    parts[7] *= 50.0  # something happened
+    of_torques = _usual_power(parts, "torque") / 0.455
+    assert of_torques == pytest.approx(np.full(2, np.mean(growing**2)), rel=0.1)
+    assert (_usual_power(parts, "position") / 0.455 < 0.8 * np.mean(growing**2)).all()
+
+
+def test_an_arm_under_torques_is_driven_by_what_was_commanded_friction_and_all(tmp_path: Path):
+    path = write_arm(tmp_path, "torque")
+    at = np.arange(0.0, 1.0, 0.01)
+    still = np.zeros((len(at), 3))
+    command = still + np.array([7.0, 0.0, 0.0])  # N m, and it does not move
+    made = Trajectory("rubs", "train", "", np.zeros(3), np.zeros(3), at, command, at, still)
+    source = ModelSource("mjcf", path, tracked="tool")
+    dataset = Dataset(tmp_path, source, "torque", JOINTS, JOINTS, (made,), (), "")
+    assert subject_of(dataset).drive[0] == pytest.approx(7.0)
+    effort = still + np.array([9.0, 0.0, 0.0])
+    logged = replace(dataset, trajectories=(replace(made, effort=effort),))
+    assert subject_of(logged).drive[0] == pytest.approx(9.0)

@@ -1,0 +1,66 @@
+"""A second search does not count what something outside did to the recordings held out."""
+
+import numpy as np
+import pytest
+
+from shared.identification.search.again import fresh, leave_out
+from shared.identification.search.searched import Search
+from shared.identification.verdict import Unexplained
+from tests.searches import ELBOW, Searches
+
+_MADE_UP = np.full(8, 3.0)
+_PUSHED = slice(110, 140)
+"""Readings, every 10 ms, of the recording that is held out."""
+
+
+@pytest.fixture(scope="module")
+def searches(tmp_path_factory: pytest.TempPathFactory) -> Searches:
+    made = Searches(tmp_path_factory.mktemp("data"), seconds=4.0)
+    (held_out,) = made.problem.of("test")
+    made.problem.segments[held_out].q[_PUSHED] += 0.05  # rad
+    return made
+
+
+@pytest.fixture
+def found(searches: Searches) -> Search:
+    searches.problem.uncounted.clear()
+    return searches.search(_MADE_UP)
+
+
+def left(begin: float, end: float, trajectory: str = "second", is_external: bool = True):
+    return Unexplained(
+        where="elbow", trajectory=trajectory, begin=begin, end=end, phase="once", size=0.01,
+        unit="rad", times_noise=9.0, is_external=is_external,
+    )  # fmt: skip
+
+
+def test_what_was_pushed_in_held_out_motion_counts_no_more(found: Search):
+    assert leave_out(found, [left(1.1, 1.4)])
+    (held_out,) = found.problem.of("test")
+    assert (
+        0.4 < 0.02 * found.problem.uncounted[held_out].sum() < 1.0
+    )  # with what it is smeared over
+    assert len(found.base_losses) == len(found.nominal_losses) == len(found.current_losses) == 6
+    assert found.base_losses.max() < 2.0
+
+
+def test_what_was_not_pushed_from_outside_or_was_fitted_to_counts(found: Search):
+    assert not leave_out(found, [left(1.1, 1.4, is_external=False), left(1.1, 1.4, "first")])
+    assert not found.problem.uncounted
+    assert found.base_losses is _MADE_UP
+
+
+def test_where_hardly_anything_would_be_left_all_of_it_counts(found: Search):
+    assert not leave_out(found, [left(0.2, 2.5)])
+    assert not found.problem.uncounted
+    assert found.base_losses is _MADE_UP
+
+
+def test_a_second_search_begins_with_nothing_found_and_leaves_the_first_alone(searches: Searches):
+    tried = searches.tried(ELBOW, _MADE_UP, _MADE_UP / 3.0)
+    first = searches.search(_MADE_UP, tried)
+    second = fresh(first, seed=4)
+    assert (second.screened, second.tried, second.accepted, second.rivals) == ({}, {}, [], [])
+    assert first.accepted == [tried]
+    assert second.problem is first.problem
+    assert fresh(first, seed=4).rng.random() == second.rng.random()

@@ -1,0 +1,52 @@
+"""Whether a base is still far from the model file once that is believed more."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shared.identification.fitting.fit import Fit, polish
+from shared.identification.fitting.space import Space
+from shared.identification.search.bent import (
+    _known,  # pyright: ignore[reportPrivateUsage]
+    _still_far,  # pyright: ignore[reportPrivateUsage]
+    _surely_far,  # pyright: ignore[reportPrivateUsage]
+)
+from shared.sim.plant.row import Row
+from tests.measured import measure, nothing, problem_of
+
+NAME = "armature elbow"
+
+
+def stiff(row: Row) -> None:
+    """Let the elbow's rotor have eight times its inertia."""
+    dof = int(row.model.joint(row.plant.mj_joint("elbow")).dofadr[0])
+    row.field("dof_armature")[dof] *= 8.0
+
+
+def bases(folder: Path, *, is_far: bool) -> tuple[Fit, Space]:
+    """Return a base at its best, but for a rotor without inertia, and where it is asked again."""
+    enter = stiff if is_far else nothing
+    problem = problem_of(measure(folder, np.random.default_rng(0), enter, seconds=4.0))
+    space, train = Space(problem), problem.of("train")
+    found = polish(space, np.zeros(space.size), train)
+    index = [each.name for each in problem.parameters].index(NAME)
+    z = found.z.copy()
+    z[index] = z[index] if is_far else space.bounds[0][index]
+    return Fit.at(space, z, train), Space(replace(problem, parameters=_known(problem)))
+
+
+def test_a_base_that_only_went_far_where_nothing_holds_it_comes_back(tmp_path: Path):
+    """A rotor of next to no inertia is hardly felt, nor is one of a little."""
+    base, space = bases(tmp_path, is_far=False)
+    assert _still_far(base, space) is None
+
+
+def test_a_base_of_which_the_recordings_say_that_it_is_far_stays_there(tmp_path: Path):
+    base, space = bases(tmp_path, is_far=True)
+    found = _still_far(base, space)
+    assert found is not None
+    names = [each.name for each in space.problem.parameters]
+    assert [names[index] for index in _surely_far(found)] == [NAME]
+    assert found.z[names.index(NAME)] == pytest.approx(np.log(8.0), rel=0.1)

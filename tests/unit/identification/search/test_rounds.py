@@ -1,0 +1,279 @@
+"""What is taken of several causes that pass, and a search as a whole."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from shared.identification.catalogue.command_latency import EFFECT as LATE
+from shared.identification.catalogue.counterbalance import EFFECT as BALANCE
+from shared.identification.catalogue.encoder_offset import EFFECT as ZERO
+from shared.identification.catalogue.gravity_tilt import EFFECT as TILT
+from shared.identification.catalogue.payload import EFFECT as PAYLOAD
+from shared.identification.catalogue.payload import OFF_CENTRE
+from shared.identification.catalogue.sample_and_hold import EFFECT as TURNS
+from shared.identification.catalogue.torque_bias import EFFECT as BIAS
+from shared.identification.catalogue.torque_gain import EFFECT as GAIN
+from shared.identification.dataset.types import Dataset, Float64
+from shared.identification.effect import Candidate
+from shared.identification.find import identify
+from shared.identification.gate.foretold import Foretold
+from shared.identification.gate.held_out import Taken
+from shared.identification.hidden.generator import hide
+from shared.identification.hidden.recipe import Recipe, wish_of
+from shared.identification.progress import silent
+from shared.identification.search.rounds import (
+    _is_rival,  # pyright: ignore[reportPrivateUsage]
+    _simplest,  # pyright: ignore[reportPrivateUsage]
+    _sure,  # pyright: ignore[reportPrivateUsage]
+    search,
+)
+from shared.identification.search.searched import Tried
+from shared.identification.verdict import Verdict
+from tests.searches import DRAG, ELBOW, LIFT, Searches
+
+_BAD = np.linspace(8.0, 12.0, 8)
+_GOOD = np.linspace(1.0, 1.2, 8)
+
+
+@pytest.fixture(scope="module")
+def searches(tmp_path_factory: pytest.TempPathFactory) -> Searches:
+    return Searches(tmp_path_factory.mktemp("data"))
+
+
+def test_of_causes_that_do_as_well_the_one_of_fewer_numbers_is_taken(searches: Searches):
+    best = searches.tried(DRAG, _BAD, _GOOD, numbers=3)
+    simple = searches.tried(ELBOW, _BAD, _GOOD + 0.01)
+    taken, rivals = _simplest([best, simple], np.random.default_rng(0))
+    assert taken is simple
+    assert rivals == ()
+
+
+@pytest.mark.parametrize(("bend", "is_taken"), [(0.2, True), (0.6, False)])
+def test_what_does_as_well_by_bending_links_further_is_not_taken_however_simple(
+    searches: Searches, bend: float, is_taken: bool
+):
+    best = searches.tried(DRAG, _BAD, _GOOD, numbers=3)
+    simple = searches.tried(ELBOW, _BAD, _GOOD)
+    names = [each.name for each in searches.problem.parameters]
+    z = simple.fit.z.copy()
+    z[names.index("mass elbow")] = bend  # 2 or 6 standard deviations: 2 or 18 of the cost
+    bent = replace(simple, fit=replace(simple.fit, z=z))
+    taken, _ = _simplest([best, bent], np.random.default_rng(0))
+    assert taken is (bent if is_taken else best)
+
+
+def test_causes_of_as_many_numbers_that_do_as_well_are_rivals(searches: Searches):
+    one = searches.tried(ELBOW, _BAD, _GOOD + 0.01)
+    other = searches.tried(LIFT, _BAD, _GOOD)
+    taken, rivals = _simplest([one, other], np.random.default_rng(0))
+    assert taken is other
+    assert rivals == (one,)
+
+
+def test_a_cause_that_does_surely_worse_is_no_rival_however_simple(searches: Searches):
+    best = searches.tried(DRAG, _BAD, _GOOD, numbers=3)
+    worse = searches.tried(ELBOW, _BAD, _GOOD + 2.0)
+    taken, rivals = _simplest([worse, best], np.random.default_rng(0))
+    assert taken is best
+    assert rivals == ()
+
+
+def test_which_cause_does_best_is_judged_by_all_recordings(searches: Searches):
+    """Of more numbers, one does a little better held out; where it was fitted to it does not."""
+    rng = np.random.default_rng(0)
+    little, fitted = 0.02 + 0.005 * rng.normal(size=8), 1.0 + 0.1 * rng.normal(size=24)
+    much = searches.tried(DRAG, _BAD, _GOOD, numbers=3)
+    simple = searches.tried(ELBOW, _BAD, _GOOD + little * 10.0)
+    assert _simplest([much, simple], rng)[0] is much
+    more = fitted + 0.2 + 0.2 * rng.normal(size=24)
+    both = replace(much, fitted=more), replace(simple, fitted=fitted)
+    assert _simplest(list(both), rng)[0] is both[1]
+
+
+def test_what_happened_once_has_no_large_say_in_which_cause_does_best(searches: Searches):
+    rng = np.random.default_rng(0)
+    fitted = 1.0 + 0.1 * rng.normal(size=24)
+    event = np.where(np.arange(24) == 7, 90.0, 0.0)
+    right = replace(searches.tried(ELBOW, _BAD, _GOOD), fitted=fitted + event)
+    wrong = replace(searches.tried(LIFT, _BAD, _GOOD + 0.3), fitted=fitted + 0.2 + 0.8 * event)
+    assert wrong.everywhere().mean() < right.everywhere().mean()
+    assert _simplest([wrong, right], rng) == (right, ())
+
+
+def test_a_cause_that_may_as_well_be_nothing_is_taken_only_if_all_may(searches: Searches):
+    train = searches.problem.of("train")
+
+    def sized(times: float) -> Tried:
+        one = searches.tried(ELBOW, _BAD, _GOOD + 0.5)
+        z = one.fit.z.copy()
+        z[one.fit.space.where(ELBOW)] *= times
+        return replace(one, fit=replace(one.fit, z=z))
+
+    there, nothing = sized(1e6), sized(1e-6)
+    event = replace(nothing, is_event=True)
+    for useful, sure in (
+        ([nothing, there], [there]),
+        ([nothing], [nothing]),
+        ([event, there], [event, there]),
+    ):
+        found = _sure(useful, train)
+        assert len(found) == len(sure)
+        assert all(one is other for one, other in zip(found, sure, strict=True))
+
+
+def test_turns_so_short_that_they_are_a_delay_are_a_rival_of_it(searches: Searches):
+    late = searches.tried(Candidate(LATE, ""), _BAD, _GOOD)
+    about = 0.01 + np.tile([-0.06, 0.06], 4)  # better in one stretch, worse in the next
+    turns = searches.tried(Candidate(TURNS, ""), _BAD, _GOOD + about, numbers=2)
+    other = searches.tried(DRAG, _BAD, _GOOD + 0.01, numbers=2)
+    taken, rivals = _simplest([turns, late, other], np.random.default_rng(0))
+    assert taken is late
+    assert rivals == (turns,)
+
+
+def test_a_counterbalance_and_a_constant_torque_are_rivals_unless_one_does_surely_better(
+    searches: Searches,
+):
+    torque = searches.tried(ELBOW, _BAD, _GOOD)
+    about = 0.01 + np.tile([-0.06, 0.06], 4)
+    balance = searches.tried(Candidate(BALANCE, "elbow"), _BAD, _GOOD + about, numbers=2)
+    assert _simplest([balance, torque], np.random.default_rng(0)) == (torque, (balance,))
+    surely = searches.tried(Candidate(BALANCE, "elbow"), _BAD, _GOOD + 0.05, numbers=2)
+    assert _simplest([surely, torque], np.random.default_rng(0)) == (torque, ())
+    fit = replace(torque.fit, cost=balance.fit.cost)
+    better = replace(torque, fitted=_GOOD + 2.0, fit=fit), replace(balance, fitted=_GOOD)
+    taken, rivals = _simplest(list(better), np.random.default_rng(0))
+    assert taken is better[1]
+    assert [one.candidate for one in rivals] == [ELBOW]
+
+
+def test_a_tilt_that_is_not_told_from_a_torque_is_its_rival_though_it_has_more_numbers(
+    searches: Searches,
+):
+    torque = searches.tried(ELBOW, _BAD, _GOOD)
+    about = 0.01 + np.tile([-0.06, 0.06], 4)
+    tilt = searches.tried(Candidate(TILT, ""), _BAD, _GOOD + about, numbers=2)
+    tilt = replace(tilt, fit=replace(tilt.fit, cost=torque.fit.cost))
+    assert _simplest([tilt, torque], np.random.default_rng(0)) == (torque, (tilt,))
+    surely = replace(tilt, losses=_GOOD + 0.05)
+    assert _simplest([surely, torque], np.random.default_rng(0)) == (torque, ())
+
+
+def test_a_payload_beside_the_centre_and_an_encoders_zero_are_rivals_if_a_little_apart(
+    searches: Searches,
+):
+    zero = searches.tried(Candidate(ZERO, "elbow"), _BAD, _GOOD)
+    apart = 0.01 * float((_BAD - _GOOD).mean())
+    heavy = searches.tried(Candidate(PAYLOAD, OFF_CENTRE), _BAD, _GOOD + apart, numbers=4)
+    heavy = replace(heavy, fit=replace(heavy.fit, cost=zero.fit.cost))
+    assert _simplest([heavy, zero], np.random.default_rng(0)) == (zero, (heavy,))
+    further = replace(heavy, losses=_GOOD + 5.0 * apart)
+    assert _simplest([further, zero], np.random.default_rng(0)) == (zero, ())
+
+
+def test_of_causes_that_are_followed_the_best_is_told_without_what_the_base_could_do(
+    searches: Searches,
+):
+    """Where only held-out motion goes the base is wrong, with whichever cause, by chance less."""
+    there = np.where(np.arange(8) % 3 == 0, 3.0, 0.0)
+    right = searches.tried(ELBOW, _BAD, _GOOD + there)
+    wrong = searches.tried(LIFT, _BAD, _GOOD + 0.5 * there + 0.3)
+    assert _simplest([right, wrong], np.random.default_rng(0))[0] is wrong
+
+    def followed(one: Tried, after: Float64) -> Tried:
+        told = Foretold(9.0, 0.9, 1.0, _GOOD + 2.0, after)
+        gain = replace(one.gain, before=left, apart=Taken(3.1, 3.1 - float(after.mean())))
+        return replace(one, foretold=told, gain=gain)
+
+    left = 1.2
+
+    both = [followed(right, _GOOD), followed(wrong, _GOOD + 0.3)]
+    assert _simplest(both, np.random.default_rng(0)) == (both[0], ())
+    mixed = [both[0], wrong]  # of one it is not known
+    assert _simplest(mixed, np.random.default_rng(0))[0] is wrong
+    left = 9.0  # there the base would make up for what is large
+    much = [followed(right, _GOOD), followed(wrong, _GOOD + 0.3)]
+    assert _simplest(much, np.random.default_rng(0))[0] is much[1]
+
+
+def test_what_explains_something_else_as_well_is_no_rival(searches: Searches):
+    found, (train, test) = searches.search(_BAD), map(searches.problem.of, ("train", "test"))
+    one = searches.tried(ELBOW, _BAD[:4], _GOOD[:4])  # stretches of what is held out
+    other = searches.tried(LIFT, _BAD[:4], _GOOD[:4])
+    assert _is_rival(found, one, other, train, test)
+    apart = replace(other, screened=replace(other.screened, signature=np.array([0.3, 0.95])))
+    assert not _is_rival(found, one, apart, train, test)
+    turns = replace(apart.screened, candidate=Candidate(TURNS, ""))
+    assert _is_rival(found, one, replace(apart, screened=turns), train, test)
+
+
+@pytest.mark.parametrize(("more", "cost"), [(0.02, 1.0), (0.0, 1.2)])
+def test_turns_that_do_surely_worse_than_a_delay_are_no_rival(
+    searches: Searches, more: float, cost: float
+):
+    late = searches.tried(Candidate(LATE, ""), _BAD, _GOOD)
+    turns = searches.tried(Candidate(TURNS, ""), _BAD, _GOOD + more, numbers=2)
+    worse = replace(turns, fit=replace(turns.fit, cost=cost * late.fit.cost + cost - 1.0))
+    assert _simplest([worse, late], np.random.default_rng(0)) == (late, ())
+
+
+def test_a_search_without_a_candidate_is_over(searches: Searches):
+    found = searches.search(_BAD)
+    found.candidates = ()
+    search(found, silent)
+    assert found.accepted == []
+
+
+_opened: list[str] = []
+_is_watching = False
+
+
+def _watch(event: str, details: tuple[Any, ...]) -> None:
+    if _is_watching and event == "open":
+        _opened.append(str(details[0]))
+
+
+@contextmanager
+def watching() -> Iterator[None]:
+    """Take note of every file that Python opens; a hook stays for good, so it is switched."""
+    global _is_watching
+    _opened.clear()
+    _is_watching = True
+    try:
+        yield
+    finally:
+        _is_watching = False
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    sys.addaudithook(_watch)
+    folder = tmp_path_factory.mktemp("hidden") / "set"
+    wish = wish_of("torque_bias@elbow=0.4")
+    recipe = Recipe(arm="torque2", wishes=(wish,), seconds=2.0, train=1, test=1, seed=11)
+    return hide(folder, recipe)
+
+
+def steady(verdict: Verdict) -> bytes:
+    """Return a verdict without what a clock says."""
+    return msgspec.json.encode(msgspec.structs.replace(verdict, cpu_s=0.0, seconds={}))
+
+
+def test_the_same_seed_gives_the_same_verdict_and_the_truth_is_never_read(dataset: Dataset):
+    truth = dataset.folder / "truth.toml"
+    with watching():
+        truth.read_bytes()
+        assert str(truth) in _opened
+        _opened.clear()
+        first = identify(dataset, seed=5, catalogue=(BIAS, GAIN)).verdict
+    assert _opened  # the model file, at least
+    assert not [path for path in _opened if "truth" in Path(path).name]
+    truth.unlink()
+    assert steady(identify(dataset, seed=5, catalogue=(BIAS, GAIN)).verdict) == steady(first)

@@ -1,0 +1,86 @@
+"""What speaks for a cause."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shared.identification.fitting.fit import Fit
+from shared.identification.gate.foretold import Foretold
+from shared.identification.search import searched
+from shared.identification.search.searched import Model, foretells, judged
+from tests.searches import ELBOW, Searches
+
+_USUAL = 1.0 + 0.2 * np.sin(np.arange(22.0))
+_EVENT = _USUAL + np.where(np.arange(22) == 7, 10.0, 0.0) + np.where(np.arange(22) == 8, 15.0, 0.0)
+
+
+def _fitted(searches: Searches) -> Fit:
+    """Return a fit that explains what it was fitted to better than the base does."""
+    fit = searches.tried(ELBOW, _USUAL, _USUAL).fit
+    return replace(fit, cost=0.9 * searches.base.cost)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "told"),
+    [
+        (_EVENT, _USUAL, True),
+        (_EVENT, np.where(np.arange(22) == 8, 7.0, _USUAL), False),  # something still stands out
+        (_EVENT, np.where(np.arange(22) == 3, 9.0, _USUAL), False),  # elsewhere, now
+        (_USUAL + 2.0, _USUAL, False),  # nothing stood out
+        (_EVENT, np.minimum(_EVENT, 5.9), False),  # half of it is no explanation
+    ],
+)
+def test_a_cause_foretells_an_event_if_nothing_of_it_is_left(before, after, told: bool):
+    assert foretells(before, after) is told
+
+
+def test_an_event_that_a_cause_foretells_makes_it_sure(tmp_path):
+    searches = Searches(tmp_path)
+    found = searches.search(_EVENT)
+    before = Model(searches.base, _EVENT)
+    fit = _fitted(searches)
+    assert judged(found, ELBOW, before, Model(fit, _USUAL)).gain.is_sure
+    some = np.where(np.arange(22) == 8, 7.0, _USUAL)
+    assert not judged(found, ELBOW, before, Model(fit, some)).gain.is_sure
+
+
+def test_what_explains_the_recordings_that_were_fitted_to_worse_is_not_sure(tmp_path):
+    searches = Searches(tmp_path)
+    found = searches.search(_USUAL + 2.0)
+    before = Model(searches.base, _USUAL + 2.0)
+    fit = _fitted(searches)
+    assert judged(found, ELBOW, before, Model(fit, _USUAL)).gain.is_sure
+    worse = replace(fit, cost=searches.base.cost + 1.0)
+    assert not judged(found, ELBOW, before, Model(worse, _USUAL)).gain.is_sure
+
+
+@pytest.mark.parametrize(
+    ("fitted", "errors", "share", "kept", "is_followed", "is_sure"),
+    [
+        (2.0, 3.0, 0.8, 1.0, True, True),
+        (3.5, 1.8, 0.8, 1.0, True, True),  # surer by what was fitted to, and the other way round
+        (1.0, 4.0, 0.8, 1.0, True, True),
+        (1.8, 2.6, 0.8, 1.0, False, True),  # then the loss itself has to say so
+        (9.0, 1.0, 0.8, 1.0, False, False),  # what goes there the base could do as well
+        (9.0, 1.0, 0.8, 0.05, False, True),  # it is a link that weighs more: that does not show
+        (9.0, 9.0, 0.2, 1.0, False, False),
+    ],
+)
+def test_a_cause_is_followed_by_what_was_fitted_to_and_what_was_held_out_together(
+    tmp_path, monkeypatch, fitted: float, errors: float, share: float, kept: float,
+    is_followed: bool, is_sure: bool,
+):  # fmt: skip
+    searches = Searches(tmp_path)
+    found = searches.search(_USUAL + 2.0)
+    told = Foretold(errors, share, kept, _USUAL + 0.5, _USUAL)
+    monkeypatch.setattr(searched, "_foretold", lambda *rest: told)
+    monkeypatch.setattr(searched, "sureness", lambda *rest: fitted)
+    fit = _fitted(searches)
+    gain, _, foretold = judged(
+        found, ELBOW, Model(searches.base, _USUAL + 2.0), Model(fit, _USUAL)
+    )  # fmt: skip
+    assert foretold is told
+    assert (gain.apart is not None) == is_followed
+    assert gain.apart is None or gain.apart.gain == pytest.approx(0.5)
+    assert gain.is_sure == is_sure
