@@ -3,6 +3,7 @@
 import tempfile
 from pathlib import Path
 
+from shared.identification.conclusion.sentence import as_told
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.find import identify
 from studies.other_arms.arms import ARMS
@@ -16,7 +17,8 @@ def asked(job: tuple[str, str, int, float]) -> str:
         data = Path(folder) / "data"
         fault = convert(data, ARMS[name], wrong, seconds, seed)
         verdict = identify(read_dataset(data), seed=seed).verdict
-    said = [f"{each.effect} {each.where} {each.value:.4g} {each.unit}" for each in verdict.causes]
+    causes = map(as_told, verdict.causes)
+    said = [f"{each.effect} {each.where} {each.value:.4g} {each.unit}" for each in causes]
     said += [
         "tie: " + " or ".join(f"{each.effect} {each.where}" for each in tie.causes)
         for tie in verdict.ties

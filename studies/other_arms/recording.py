@@ -1,6 +1,6 @@
 """Moves an arm with something wrong, and logs it."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -28,7 +28,9 @@ _MOTIONS: Final[dict[str, tuple[Split, str, float]]] = {
 """What each is for, what it repeats, and its fastest sine (Hz)."""
 
 
-def convert(out: Path, arm: Arm, name: str, seconds: float = 8.0, seed: int = 0) -> Fault:
+def convert(
+    out: Path, arm: Arm, name: str, seconds: float = 8.0, seed: int = 0, step: float = _STEP
+) -> Fault:
     """Write a data set: four recordings to fit to, one of them a repeat, and two held out.
 
     Args:
@@ -37,6 +39,7 @@ def convert(out: Path, arm: Arm, name: str, seconds: float = 8.0, seed: int = 0)
         name: of what is wrong.
         seconds: of a recording.
         seed: of everything random.
+        step: of what moves the arm (s).
 
     Returns:
         What is wrong, which is in the notes of ``dataset.toml`` for people, too.
@@ -44,15 +47,16 @@ def convert(out: Path, arm: Arm, name: str, seconds: float = 8.0, seed: int = 0)
     rng = np.random.default_rng(seed)
     own = arm.numbers.spread(_SPREAD, rng)
     fault = draw(name, arm, rng)
-    limit = arm.limit
+    rig = _Rig(arm, own, fault, arm.limit, rng, step)
     commands = {name: _motion(arm, name, seconds, seed) for name in _MOTIONS}
     if fault.name == "torque_saturation":
         joint = arm.joints.index(fault.where)
-        _, torques = _moved(arm, own, fault, commands["fast"], limit, rng)
-        limit = limit.copy()
+        _, torques = rig.moved(commands["fast"])
+        limit = arm.limit.copy()
         limit[joint] = fault.value * np.abs(torques[:, joint]).max()
         fault = replace(fault, value=float(limit[joint]), unit="N m")
-    made = tuple(_recording(name, arm, own, fault, commands[name], limit, rng) for name in _MOTIONS)
+        rig = replace(rig, fault=fault, limit=limit)
+    made = tuple(rig.recording(name, wanted) for name, wanted in commands.items())
     wrong = {"effect": fault.name, "where": fault.where, "value": fault.value, "unit": fault.unit}
     notes = {"source": "simulated", "seed": seed, "wrong": wrong}
     write(out, arm.mjcf(arm.numbers, _FILE_STEP), arm.control, arm.joints, made, notes)
@@ -71,57 +75,64 @@ def _motion(arm: Arm, name: str, seconds: float, seed: int) -> Float64:
     return arm.home + 1.5 * arm.swing * np.minimum(at / 1.5, 1.0)[:, None] * (waves - waves[0])
 
 
-def _recording(
-    name: str, arm: Arm, own: Numbers, fault: Fault, wanted: Float64, limit: Float64,
-    rng: np.random.Generator,
-) -> Trajectory:  # fmt: skip
-    split, repeats, _ = _MOTIONS[name]
-    q, torques = _moved(arm, own, fault, wanted, limit, rng)
-    at: Float64 = arm.period * np.arange(len(q), dtype=np.float64)
-    q = q + arm.noise * rng.standard_normal(q.shape)
-    command = torques if arm.control == "torque" else wanted
-    return Trajectory(name, split, repeats, q[0], np.zeros(q.shape[1]), at, command, at, q)
+@dataclass(frozen=True)
+class _Rig:
+    """An arm, what is wrong with it, and what moves it."""
 
+    arm: Arm
+    own: Numbers
+    fault: Fault
+    limit: Float64
+    """Largest torques, float64[J] (N m, N)."""
+    rng: np.random.Generator
+    step: float
+    """Of the physics (s)."""
 
-def _moved(
-    arm: Arm, own: Numbers, fault: Fault, wanted: Float64, limit: Float64,
-    rng: np.random.Generator,
-) -> tuple[Float64, Float64]:  # fmt: skip
-    """Return positions and torques, those commanded where torques are, float64[T, J] each."""
-    model = mujoco.MjModel.from_xml_string(arm.mjcf(own, _STEP))
-    fault.edit(model)
-    model.actuator_forcerange[:] = np.stack([-limit, limit], axis=1)
-    data = mujoco.MjData(model)
-    data.qpos[:] = wanted[0]
-    controller = _Controller(arm, own)
-    every, settle = round(arm.period / _STEP), round(_SETTLE / _STEP)
-    speeds = np.gradient(wanted, arm.period, axis=0)
-    q, torques = np.empty_like(wanted), np.empty_like(wanted)
-    sent: list[Float64] = []
-    push = np.zeros(len(limit))
-    for step in range(settle + every * len(wanted)):
-        row, part = divmod(step - settle, every)
-        if part == 0:
-            if row >= 0:
-                q[row] = data.qpos
-            moving = speeds[row] if row > 0 else np.zeros(len(limit))
-            command = controller(wanted[max(row, 0)], moving, data)
-        sent.append(command)
-        data.ctrl[:] = sent[_arrived(step, fault)]
-        if step % round(_PUSHED / _STEP) == 0:
-            push = 0.98 * push + arm.push * arm.limit * rng.standard_normal(len(limit))
-        data.qfrc_applied[:] = fault.law(data.qpos, data.qvel) + push
-        mujoco.mj_step(model, data)
-        if part == 0 and row >= 0:
-            torques[row] = command if arm.control == "torque" else data.actuator_force
-    return q, torques
+    def recording(self, name: str, wanted: Float64) -> Trajectory:
+        """Return what is logged of a motion, float64[T, J], with the noise of readings."""
+        arm, (split, repeats, _) = self.arm, _MOTIONS[name]
+        q, torques = self.moved(wanted)
+        at: Float64 = arm.period * np.arange(len(q), dtype=np.float64)
+        q = q + arm.noise * self.rng.standard_normal(q.shape)
+        command = torques if arm.control == "torque" else wanted
+        return Trajectory(name, split, repeats, q[0], np.zeros(q.shape[1]), at, command, at, q)
 
+    def moved(self, wanted: Float64) -> tuple[Float64, Float64]:
+        """Return positions and torques, those commanded where torques are, float64[T, J] each."""
+        arm, limit = self.arm, self.limit
+        model = mujoco.MjModel.from_xml_string(arm.mjcf(self.own, self.step))
+        self.fault.edit(model)
+        model.actuator_forcerange[:] = np.stack([-limit, limit], axis=1)
+        data = mujoco.MjData(model)
+        data.qpos[:] = wanted[0]
+        controller = _Controller(arm, self.own)
+        every, settle = round(arm.period / self.step), round(_SETTLE / self.step)
+        speeds = np.gradient(wanted, arm.period, axis=0)
+        q, torques = np.empty_like(wanted), np.empty_like(wanted)
+        sent: list[Float64] = []
+        push = np.zeros(len(limit))
+        for count in range(settle + every * len(wanted)):
+            row, part = divmod(count - settle, every)
+            if part == 0:
+                if row >= 0:
+                    q[row] = data.qpos
+                moving = speeds[row] if row > 0 else np.zeros(len(limit))
+                command = controller(wanted[max(row, 0)], moving, data)
+            sent.append(command)
+            data.ctrl[:] = sent[self._arrived(count)]
+            if count % round(_PUSHED / self.step) == 0:
+                push = 0.98 * push + arm.push * arm.limit * self.rng.standard_normal(len(limit))
+            data.qfrc_applied[:] = self.fault.law(data.qpos, data.qvel) + push
+            mujoco.mj_step(model, data)
+            if part == 0 and row >= 0:
+                torques[row] = command if arm.control == "torque" else data.actuator_force
+        return q, torques
 
-def _arrived(step: int, fault: Fault) -> int:
-    """Return the number of the command that acts in a step, which is late or kept for a while."""
-    if fault.hold:
-        step -= step % round(fault.hold / _STEP)
-    return max(step - round(fault.delay / _STEP), 0)
+    def _arrived(self, count: int) -> int:
+        """Return the number of the command that acts in a step, late or kept for a while."""
+        if self.fault.hold:
+            count -= count % round(self.fault.hold / self.step)
+        return max(count - round(self.fault.delay / self.step), 0)
 
 
 class _Controller:
@@ -129,7 +140,7 @@ class _Controller:
 
     def __init__(self, arm: Arm, own: Numbers) -> None:
         self._arm, self._own = arm, own
-        self._known = mujoco.MjModel.from_xml_string(arm.mjcf(arm.numbers, _STEP))
+        self._known = mujoco.MjModel.from_xml_string(arm.mjcf(arm.numbers, _FILE_STEP))
         self._weight = mujoco.MjData(self._known)
 
     def __call__(self, wanted: Float64, speed: Float64, data: mujoco.MjData) -> Float64:

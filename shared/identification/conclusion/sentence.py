@@ -1,5 +1,7 @@
 """Says in a sentence or two what a search comes to."""
 
+import math
+
 import msgspec
 
 from shared.identification.search.searched import NEARLY_NOISE
@@ -97,8 +99,13 @@ def as_told(cause: Cause) -> Cause:
     """Return a cause with a size for people: of what is sought as one over it, the thing itself.
 
     ``inverse_limit`` in 1/(N m) is a limit in N m; its upper end is infinite where the inverse may
-    be 0, which is no limit.
+    be 0, which is no limit. Of a cosine and a sine it is the amplitude, as well known as either.
     """
+    if cause.quantity == "cosine":
+        amplitude = math.hypot(cause.value, cause.others["sine"])
+        half = 0.5 * (cause.interval.high - cause.interval.low)
+        ends = Interval(low=max(amplitude - half, 0.0), high=amplitude + half)
+        return msgspec.structs.replace(cause, quantity="amplitude", value=amplitude, interval=ends)
     name = cause.quantity.removeprefix("inverse_")
     if name == cause.quantity or not cause.value > 0.0:
         return cause

@@ -1,7 +1,5 @@
 """How sure a fitted number is, when noise is neither white nor all that is left."""
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.special import fdtrc, ndtri, stdtrit
 
@@ -63,16 +61,23 @@ def sureness(fit: Fit, candidate: Candidate, segments: tuple[int, ...]) -> float
 
 
 def _that_do_something(fit: Fit, candidate: Candidate, segments: tuple[int, ...]) -> list[int]:
-    """Return which numbers of a cause but the first change anything by themselves."""
+    """Return which numbers of a cause but the first change anything by themselves.
+
+    How often a torque ripples changes nothing, but without it the torque does not ripple: such
+    numbers keep their size, and are none of these.
+    """
+    problem = fit.space.problem
+    quantities = candidate.effect.quantities(problem.subject, candidate.place)
+    amounts = [index for index, each in enumerate(quantities) if index and not each.grid]
     own = fit.space.where(candidate)
-    size = own.stop - own.start
-    alone = np.tile(fit.z, (size, 1))
-    alone[:, own] = np.diag(fit.z[own])
-    variants = [fit.space.variant(z) for z in alone]
-    kept = tuple(each for each in variants[0].extras if each[0] != candidate)
-    found = fit.space.problem.vector([*variants, replace(variants[0], extras=kept)], segments)
+    forms = np.where([bool(each.grid) for each in quantities], fit.z[own], 0.0)
+    alone = np.tile(fit.z, (len(amounts) + 1, 1))
+    alone[:, own] = forms
+    for row, index in enumerate(amounts):
+        alone[row, own.start + index] = fit.z[own.start + index]
+    found = problem.vector([fit.space.variant(z) for z in alone], segments)
     changed = np.abs(found[:-1] - found[-1]).max(axis=1) > _NOTHING
-    return [index for index in range(1, size) if changed[index]]
+    return [index for index, is_changed in zip(amounts, changed, strict=True) if is_changed]
 
 
 def _errors(z: Float64, covariance: Float64, free: int, which: Integers) -> float:

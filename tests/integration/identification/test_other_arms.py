@@ -12,10 +12,12 @@ from studies.other_arms.faults import ABSORBED, FAULTS
 from studies.other_arms.recording import convert
 
 SECONDS = 2.0
+STEP = 0.0005
+"""Ten times as long as that of a study (s)."""
 
 
 def made(folder: Path, arm: str, fault: str, seed: int = 3) -> Dataset:
-    convert(folder / fault, ARMS[arm], fault, SECONDS, seed)
+    convert(folder / fault, ARMS[arm], fault, SECONDS, seed, STEP)
     return read_dataset(folder / fault)
 
 

@@ -61,6 +61,15 @@ def test_a_limit_sought_as_one_over_it_is_told_as_a_limit() -> None:
     assert "weak at elbow (limit 4 N m, at least 2)." in told[1]
 
 
+def test_a_ripple_is_told_by_its_amplitude() -> None:
+    ripple = Cause(
+        effect="cogging", where="elbow", quantity="cosine", value=0.0, unit="N m",
+        interval=Interval(low=-0.01, high=0.01), others={"sine": -0.2, "ripples": 12.0},
+        title="it ripples", signature="",
+    )  # fmt: skip
+    assert cause_text(ripple) == "it ripples at elbow: amplitude 0.2 N m (0.19 to 0.21)"
+
+
 @pytest.mark.parametrize(
     ("value", "text"),
     [(1234567.0, "1,234,567"), (0.00001234, "0.0000123"), (float("nan"), "not known"), (7.0, "7")],

@@ -7,6 +7,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from shared.identification.catalogue.cogging import EFFECT as COGGING
 from shared.identification.catalogue.gravity_tilt import EFFECT as TILT
 from shared.identification.catalogue.stribeck_friction import EFFECT as STRIBECK
 from shared.identification.effect import Candidate, Effect
@@ -71,6 +72,19 @@ def test_a_cause_is_there_if_what_is_sure_of_it_does_something(
     widths = CALIBRATED * half_widths(fit, train)[-2:]
     for sure, expected in (((0.0, 0.0), False), ((0.0, 10.0), is_enough), ((10.0, 0.0), True)):
         z = np.r_[fit.z[:-2], np.array(sure) * np.maximum(widths, 0.1)]
+        assert is_there(replace(fit, z=z), candidate, train) == expected
+
+
+def test_a_ripple_is_there_though_its_phase_makes_one_of_its_two_sizes_nothing(tmp_path: Path):
+    space = Space(problem_of(measure(tmp_path, np.random.default_rng(0), seconds=2.0)))
+    candidate = Candidate(COGGING, "elbow")
+    grown, train = space.grown(candidate), space.problem.of("train")
+    often = COGGING.quantities(space.problem.subject, "elbow")[2]
+    start = np.r_[np.zeros(grown.size - 1), often.grid[0] / often.probe]
+    fit = Fit.at(grown, start, train)
+    widths = CALIBRATED * half_widths(fit, train)[-3:-1]
+    for sure, expected in (((0.0, 0.0), False), ((0.0, 10.0), True), ((10.0, 0.0), True)):
+        z = np.r_[start[:-3], np.array(sure) * np.maximum(widths, 0.1), start[-1]]
         assert is_there(replace(fit, z=z), candidate, train) == expected
 
 
