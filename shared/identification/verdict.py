@@ -35,6 +35,8 @@ class Cause(_Part, frozen=True, kw_only=True):
     signature: str
     others: dict[str, float] = {}
     """Further quantities of the same effect, by name."""
+    other_units: dict[str, str] = {}
+    """Theirs; older verdicts do not say."""
     share: float = 0.0
     """Of the explainable held-out residual that it removes by itself."""
     share_interval: Interval | None = None

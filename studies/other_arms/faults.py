@@ -134,7 +134,7 @@ def _late(arm: Arm, joint: int, size: float) -> Fault:
 
 
 def _held(arm: Arm, joint: int, size: float) -> Fault:
-    value = 0.05 * size
+    value = round(0.05 * size, 3)
     return Fault("sample_and_hold", "", value, "s", hold=value)
 
 

@@ -144,7 +144,10 @@ def _cause(cause: Cause) -> Html:
             f"{told.quantity} (95 %)",
             tag("b", words.quantity_text(told.value, told.unit, told.interval)),
         ),
-        *((name, words.number_text(value)) for name, value in cause.others.items()),
+        *(
+            (name, words.quantity_text(value, cause.other_units.get(name, "")))
+            for name, value in cause.others.items()
+        ),
         ("explains by itself", words.share_text(cause.share, cause.share_interval)),
     ]
     where = f" at {cause.where}" if cause.where else ""

@@ -46,6 +46,7 @@ def _cause(found: Search, tried: Tried, values: Float64, widths: Float64, base: 
             each.name: float(number)
             for each, number in zip(quantities[1:], values[1:], strict=True)
         },
+        other_units={each.name: each.unit for each in quantities[1:]},
         share=tried.gain.share(base),
         share_interval=Interval(low=low, high=high),
     )

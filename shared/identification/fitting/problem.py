@@ -1,9 +1,10 @@
 """Variants of the model against the recordings: residuals in units of the noise floor."""
 
+import copy
 import math
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from shared.identification.fitting.parameters import BaseParameter, enter_base
 from shared.identification.noise.floor import Noise
 from shared.sim.plant.rollouts import Reports, Rollouts
 from shared.sim.plant.row import Row
-from shared.sim.plant.signals import pose_error
+from shared.sim.plant.signals import pose_error, smoothed
 from shared.sim.plant.structure import Structure
 
 BLOCK = 0.02
@@ -80,6 +81,17 @@ class Problem:
             self.subject, self.dataset, self.parameters, self.noise, window,
             _structures=self._structures,
         )  # fmt: skip
+
+    def smooth(self) -> "Problem":
+        """Return the same with commands that move on straight lines, not from step to step."""
+        is_pose = self.subject.control == "pose"
+        same = copy.copy(self)
+        same.segments = tuple(
+            replace(each, recorded=replace(each.recorded, command=smoothed(command, is_pose)))
+            for each in self.segments
+            for command in (each.recorded.command,)
+        )
+        return same
 
     def freer(self, more: Sequence[BaseParameter]) -> "Problem":
         """Return the same with more numbers in the base, after those that it has."""

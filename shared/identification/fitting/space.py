@@ -62,6 +62,10 @@ class Space:
         """Return float64[n], of difference quotients."""
         return np.array([_STEP] * self.base_size + [_EXTRA_STEP] * len(self.quantities))
 
+    def smooth(self) -> "Space":
+        """Return the same with smooth commands, see :meth:`Problem.smooth`."""
+        return Space(self.problem.smooth(), self.candidates)
+
     def variant(self, z: Float64) -> Variant:
         """Return the model at a vector."""
         extras: list[tuple[Candidate, Float64]] = []

@@ -2,9 +2,11 @@
 
 Off by little, an interval is off by more at every turn, and by half of itself before the end of a
 recording: the cost has a minimum at every few such steps. So it is sought as a frequency is,
-roughly in the first second of the recording that shows it best, then closer in the first second
-of all, in twice as much, and so on. What the base could absorb is taken out of the cost: the mean
-delay, which half of an interval makes, is much of what an interval does, and says little about it.
+roughly in the second that shows it best, then closer in that second of all recordings, in what is
+around it up to twice as far, and so on. Which command a turn takes jumps, too: off by a thousandth,
+one turn in ten takes another one. So it is sought with smooth commands first. What the base could
+absorb is taken out of the cost: the mean delay, which half of an interval makes, is much of what an
+interval does, and says little about it.
 """
 
 from dataclasses import dataclass
@@ -19,7 +21,7 @@ LATE = {"sample_and_hold": "command_latency"}
 """What hardly differs from another cause while it is small: a command that is taken at intervals
 is late by half of one."""
 _FIRST = 1.0
-"""How much of each recording is looked at first (s)."""
+"""How far about the part that shows it best is looked at first (s)."""
 _FINE = 6.0
 """Steps in which a turn at the end of what is looked at moves by a whole interval."""
 
@@ -35,13 +37,15 @@ class About(NamedTuple):
     """Times that steps are halved once all of the recordings are looked at."""
 
 
-WIDE = About(1.6, 8, 2)
+WIDE = About(1.6, 8, 1)
 """Where only the screen has seen it."""
-LIKELY = About(1.25, 8, 2)
+LIKELY = About(1.25, 8, 1)
 """Where it makes the delay that fits best: half of it, and what the base makes up for."""
 NEAR = About(1.005, 32, 5)
 """Where the base was fitted with it. Which command a turn takes jumps, so of a hundred turns the
 one that is nearest to a command must be right to a hundredth of their interval."""
+_ABOUT = NEAR._replace(closer=1)
+"""Where it was found by smooth commands, before the base is fitted with it."""
 _FEWEST, _MOST = 5, 256
 """Intervals tried first. Where it would take more, turns come so often that only their mean shows,
 and that is smooth."""
@@ -60,11 +64,18 @@ class Turning:
     phase: int
     phase_probe: float
 
-    def at(self, z: Float64, interval: float, phase: float) -> Float64:
-        """Return a vector with them in their own units."""
+    def at(self, z: Float64, interval: float, phase: float, since: float = 0.0) -> Float64:
+        """Return a vector with them in their own units.
+
+        Args:
+            z: float64[n], the vector.
+            interval: in its own unit.
+            phase: how much of an interval passes from then on until the next turn.
+            since: then, after the first command (s).
+        """
         moved = z.copy()
         moved[self.interval] = interval / self.interval_probe
-        moved[self.phase] = phase % 1.0 / self.phase_probe
+        moved[self.phase] = (phase + since / interval) % 1.0 / self.phase_probe
         return moved
 
 
@@ -102,6 +113,23 @@ def aligned(
     turning = turning_of(space)
     if turning is None or z[turning.interval] <= 0.0:
         return z
+    found: Float64 | None = z
+    if about is not NEAR:
+        found = _sought(space.smooth(), z, turning, segments, about, base)
+        about = _ABOUT
+    if found is not None:
+        found = _sought(space, found, turning, segments, about, base)
+    if found is None:
+        return z
+    costs = _Cost(space, segments, base)([z, found], segments)
+    return found if costs[1] < costs[0] else z
+
+
+def _sought(
+    space: Space, z: Float64, turning: Turning, segments: tuple[int, ...], about: About,
+    base: Float64 | None,
+) -> Float64 | None:  # fmt: skip
+    """Return the vector with the interval and phase that fit best; None if turns come too often."""
     parts = {segment: space.problem.segments[segment].recorded for segment in segments}
     expected = float(z[turning.interval]) * turning.interval_probe
     last = max(part.begin + float(part.joints_at[-1]) for part in parts.values())
@@ -110,7 +138,7 @@ def aligned(
     low, high = expected / about.factor, expected * about.factor
     count = max(int(np.ceil((high - low) / max(step, 1e-9))), _FEWEST)
     if count > _MOST:
-        return z
+        return None
     cost = _Cost(space, segments, base)
     wider = 1.0 / about.phases
     tries: list[tuple[float, float]] = [
@@ -118,9 +146,10 @@ def aligned(
         for interval in np.geomspace(low, high, count)
         for phase in range(about.phases)
     ]
-    picked = tuple(segment for segment in segments if parts[segment].begin < reach)
-    first = turning.at(z, expected, 0.0), turning.at(z, expected, 0.5)
-    costs = cost([turning.at(z, *each) for each in tries], (cost.telling(*first, picked),))
+    telling = cost.telling(turning.at(z, expected, 0.0), turning.at(z, expected, 0.5))
+    since = parts[telling].begin
+    last = max(since, last - since)
+    costs = cost([turning.at(z, *each, since) for each in tries], (telling,))
     closer = 0
     while True:
         best: list[tuple[float, float]] = [tries[index] for index in np.argsort(costs)[:_KEPT]]
@@ -131,12 +160,13 @@ def aligned(
             for along in _AROUND
             for around in (-1.0, 0.0, 1.0)
         ]
-        picked = tuple(segment for segment in segments if parts[segment].begin < reach)
-        vectors = [space.clip(turning.at(z, *each)) for each in tries]
+        picked = tuple(
+            segment for segment in segments if -reach < parts[segment].begin - since < reach
+        )
+        vectors = [space.clip(turning.at(z, *each, since)) for each in tries]
         costs = cost(vectors, picked)
         if reach >= last and closer == about.closer:
-            found = vectors[int(np.argmin(costs))]
-            return found if costs.min() < cost([z], picked)[0] else z
+            return vectors[int(np.argmin(costs))]
         closer += reach >= last
         reach *= 2.0
         wider *= 0.5
@@ -162,10 +192,10 @@ class _Cost:
         basis = np.linalg.qr(able).Q
         return np.asarray(np.sum((found - found @ basis @ basis.T) ** 2, axis=1), np.float64)
 
-    def telling(self, one: Float64, other: Float64, picked: tuple[int, ...]) -> int:
+    def telling(self, one: Float64, other: Float64) -> int:
         """Return the segment in which two vectors differ most."""
         differ = [
             float(np.sum(np.ptp(self._space.residual([one, other], (segment,)), axis=0) ** 2))
-            for segment in picked
+            for segment in self._segments
         ]
-        return picked[int(np.argmax(differ))]
+        return self._segments[int(np.argmax(differ))]

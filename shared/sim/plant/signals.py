@@ -7,6 +7,8 @@ import numpy as np
 from shared.sim.arm import Float64
 from shared.sim.servo import CYCLE
 
+_BETWEEN = 10
+"""So many values of a smooth signal come where one came."""
 POSE = 7
 """Numbers of a pose: position (m) and quaternion (w, x, y, z)."""
 
@@ -100,6 +102,21 @@ def sampled_poses(at: Float64, poses: Float64, wanted: Float64) -> Float64:
     out = start + share * (end - start)
     out[:, 3:] /= np.linalg.norm(out[:, 3:], axis=1, keepdims=True)
     return out
+
+
+def smoothed(signal: Signal, is_pose: bool) -> Signal:
+    """Return values that move on straight lines, half a period late, as they are while they hold.
+
+    Args:
+        signal: its values come about as often all the time.
+        is_pose: whether they are poses.
+    """
+    if len(signal.at) < 2:
+        return signal
+    every = float(np.median(np.diff(signal.at)))
+    at = np.arange(signal.at[0], signal.at[-1] + every, every / _BETWEEN)
+    line = sampled_poses if is_pose else sampled
+    return Signal(at, line(signal.at + 0.5 * every, signal.values, at))
 
 
 def pose_error(measured: Float64, predicted: Float64) -> Float64:

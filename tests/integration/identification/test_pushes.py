@@ -22,6 +22,7 @@ def test_what_is_plain_by_the_torque_that_was_missing_is_named(wish: str, seed: 
     (cause,) = verdict.causes
     assert (cause.effect, cause.where) == ("external_contact", truth.effect[0].where)
     assert cause.interval.low <= torque <= cause.interval.high
+    assert cause.other_units == {"begin": "s", "length": "s"}
     assert cause.others["begin"] == pytest.approx(begin, abs=0.05)
     assert cause.others["length"] == pytest.approx(length, rel=0.2)
     assert not verdict.unexplained

@@ -1,5 +1,6 @@
 """An interval that comes again and again is found from afar, to a small part of itself."""
 
+import copy
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 from shared.identification.catalogue.command_latency import EFFECT as LATENCY
 from shared.identification.catalogue.sample_and_hold import EFFECT as HOLD
 from shared.identification.effect import Candidate
-from shared.identification.fitting.turns import NEAR, Turning, aligned, turning_of
+from shared.identification.fitting.turns import LIKELY, NEAR, Turning, aligned, turning_of
 
 PROBES = (0.02, 0.25)
 SECONDS = 6
@@ -44,6 +45,11 @@ class Latched:
         self.candidates = (Candidate(HOLD, ""),)
         self.size = 5
 
+    def smooth(self) -> "Latched":
+        same = copy.copy(self)
+        same.every = 0.0
+        return same
+
     def clip(self, z: Any) -> Any:
         return np.clip(z, 0.0, 10.0)
 
@@ -73,6 +79,22 @@ def test_it_is_found_from_a_rough_size(interval: float, phase: float, expected: 
     assert z[:3] == pytest.approx(begun[:3])
     assert z[3] * PROBES[0] == pytest.approx(interval, rel=0.004)
     assert space.looks < 4000
+
+
+@pytest.mark.parametrize(
+    ("interval", "phase", "expected"),
+    [(0.0571, 0.718, 1.2), (0.039, 0.718, 0.91), (0.032, 0.35, 1.08)],
+)
+def test_it_is_found_though_which_command_a_turn_takes_jumps_and_motion_begins_slowly(
+    monkeypatch: pytest.MonkeyPatch, interval: float, phase: float, expected: float
+):
+    quick = wanted
+    monkeypatch.setattr(f"{__name__}.wanted", lambda at: np.minimum(at / 3.0, 1.0) ** 2 * quick(at))
+    space: Any = Latched(interval, phase, every=0.01)
+    parts = tuple(range(SECONDS))
+    begun = np.array([0.1, 0.2, 0.3, expected * interval / PROBES[0], 0.0])
+    z = aligned(space, begun, parts, LIKELY)
+    assert z[3] * PROBES[0] == pytest.approx(interval, rel=5e-4)
 
 
 def test_once_it_is_nearly_known_every_turn_takes_its_own_command():
