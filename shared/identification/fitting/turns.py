@@ -4,7 +4,7 @@ Off by little, an interval is off by more at every turn, and by half of itself b
 recording: the cost has a minimum at every few such steps. So it is sought as a frequency is,
 roughly in the second that shows it best, then closer in that second of all recordings, in what is
 around it up to twice as far, and so on. Which command a turn takes jumps, too: off by a thousandth,
-one turn in ten takes another one. So it is sought with smooth commands first. What the base could
+one turn in ten takes another one. So it is sought with smooth commands, too. What the base could
 absorb is taken out of the cost: the mean delay, which half of an interval makes, is much of what an
 interval does, and says little about it.
 """
@@ -37,15 +37,17 @@ class About(NamedTuple):
     """Times that steps are halved once all of the recordings are looked at."""
 
 
-WIDE = About(1.6, 8, 1)
+WIDE = About(1.6, 8, 2)
 """Where only the screen has seen it."""
-LIKELY = About(1.25, 8, 1)
+LIKELY = About(1.25, 8, 2)
 """Where it makes the delay that fits best: half of it, and what the base makes up for."""
 NEAR = About(1.005, 32, 5)
 """Where the base was fitted with it. Which command a turn takes jumps, so of a hundred turns the
 one that is nearest to a command must be right to a hundredth of their interval."""
 _ABOUT = NEAR._replace(closer=1)
 """Where it was found by smooth commands, before the base is fitted with it."""
+_APART = 3.0
+"""Commands between two turns, from which it is sought with smooth ones, too."""
 _FEWEST, _MOST = 5, 256
 """Intervals tried first. Where it would take more, turns come so often that only their mean shows,
 and that is smooth."""
@@ -113,16 +115,22 @@ def aligned(
     turning = turning_of(space)
     if turning is None or z[turning.interval] <= 0.0:
         return z
-    found: Float64 | None = z
-    if about is not NEAR:
-        found = _sought(space.smooth(), z, turning, segments, about, base)
-        about = _ABOUT
-    if found is not None:
-        found = _sought(space, found, turning, segments, about, base)
-    if found is None:
+    ways = [(space, z, about)]
+    if about is not NEAR and _are_far_apart(space, z, turning, segments):
+        rough = _sought(space.smooth(), z, turning, segments, about, base)
+        ways += [] if rough is None else [(space, rough, _ABOUT)]
+    found = [_sought(where, begun, turning, segments, how, base) for where, begun, how in ways]
+    tries = [z, *(each for each in found if each is not None)]
+    if len(tries) == 1:
         return z
-    costs = _Cost(space, segments, base)([z, found], segments)
-    return found if costs[1] < costs[0] else z
+    return tries[int(np.argmin(_Cost(space, segments, base)(tries, segments)))]
+
+
+def _are_far_apart(space: Space, z: Float64, turning: Turning, segments: tuple[int, ...]) -> bool:
+    """Return whether some commands come between two turns: smooth ones say about as much then."""
+    at = space.problem.segments[segments[0]].recorded.command.at
+    every = float(np.median(np.diff(at))) if len(at) > 1 else np.inf
+    return float(z[turning.interval]) * turning.interval_probe > _APART * every
 
 
 def _sought(

@@ -37,7 +37,11 @@ class Latched:
         self.at = [begin + np.arange(0.0, 1.0, step) for begin in range(SECONDS)]
         self.every = every
         self.logged = [held(at, interval, phase, every) for at in self.at]
-        parts = [SimpleNamespace(begin=float(b), joints_at=[0.0, 0.99]) for b in range(SECONDS)]
+        command = SimpleNamespace(at=[0.0, every] if every else [0.0])
+        parts = [
+            SimpleNamespace(begin=float(b), joints_at=[0.0, 0.99], command=command)
+            for b in range(SECONDS)
+        ]
         segments = [SimpleNamespace(recorded=part) for part in parts]
         self.problem = SimpleNamespace(segments=segments, subject=None)
         self.looks = 0
