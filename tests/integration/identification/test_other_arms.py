@@ -16,14 +16,21 @@ STEP = 0.0005
 """Ten times as long as that of a study (s)."""
 
 
+@pytest.fixture(scope="module")
+def right(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Dataset]:
+    """Return what is recorded where nothing is wrong, by arm."""
+    folder = tmp_path_factory.mktemp("right")
+    return {arm: made(folder / arm, arm, "none") for arm in ARMS}
+
+
 def made(folder: Path, arm: str, fault: str, seed: int = 3) -> Dataset:
     convert(folder / fault, ARMS[arm], fault, SECONDS, seed, STEP)
     return read_dataset(folder / fault)
 
 
 @pytest.mark.parametrize("arm", ARMS)
-def test_an_arm_is_recorded_with_a_repeat_and_held_out_motion(tmp_path: Path, arm: str):
-    dataset = made(tmp_path, arm, "none")
+def test_an_arm_is_recorded_with_a_repeat_and_held_out_motion(right: dict[str, Dataset], arm: str):
+    dataset = right[arm]
     assert dataset.joints == ARMS[arm].joints
     assert dataset.control == ARMS[arm].control
     splits = [each.split for each in dataset.trajectories]
@@ -40,12 +47,14 @@ def test_an_arm_is_recorded_with_a_repeat_and_held_out_motion(tmp_path: Path, ar
     ("arm", "fault"),
     [("scara", name) for name in FAULTS if name not in ("none", "weak")] + [("three", "weak")],
 )
-def test_what_is_wrong_moves_the_arm_otherwise(tmp_path: Path, arm: str, fault: str):
-    right, wrong = (made(tmp_path, arm, name) for name in ("none", fault))
+def test_what_is_wrong_moves_the_arm_otherwise(
+    tmp_path: Path, right: dict[str, Dataset], arm: str, fault: str
+):
+    wrong = made(tmp_path, arm, fault)
     noise = ARMS[arm].noise
     off = [
         float(np.sqrt(np.mean((one.q - other.q) ** 2)))
-        for one, other in zip(right.trajectories, wrong.trajectories, strict=True)
+        for one, other in zip(right[arm].trajectories, wrong.trajectories, strict=True)
     ]
     assert max(off) > 5.0 * noise
 

@@ -102,6 +102,7 @@ def test_what_a_long_time_step_leaves_is_no_cause_but_a_shorter_step(tmp_path: P
     assert (tmp_path / "steps" / "shorter_step" / "base_fit.json").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_what_a_long_time_step_leaves_is_no_push(tmp_path: Path):
     verdict = identify(_recorded(tmp_path, 1, 0.005, 1e-5, np.zeros(2)), seed=1).verdict
