@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.sim.plant.row import Row
@@ -87,3 +90,8 @@ class Candidate:
     def recording(self) -> str | None:
         """Return the name of the one recording that it is in, None if it may be in any."""
         return self.place.split(IN_RECORDING, 1)[1] if self.effect.name == ONCE else None
+
+    def forms(self, subject: Subject) -> NDArray[np.bool_]:
+        """Return bool[Q], which of its numbers say how, not how much."""
+        quantities = self.effect.quantities(subject, self.place)
+        return np.array([bool(each.grid) for each in quantities], np.bool_)

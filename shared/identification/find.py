@@ -147,11 +147,7 @@ def _may_be_its_step(found: Search) -> bool:
 
     It leaves a little more than a verdict may leave, or something looks like a small push.
     """
-    new, plain = (
-        min(each.current, np.inf if each.by_all is None else each.by_all)
-        for each in (found.left, found.plainly)
-    )
-    is_little = is_open(found) and max(new, plain) < _LITTLE
+    is_little = is_open(found) and max(found.left.least, found.plainly.least) < _LITTLE
     return is_little or any(one.is_event for one in found.accepted)
 
 
@@ -225,9 +221,10 @@ def _verdict(
 
 def _shorter_step(found: Search, dataset: Dataset) -> str:
     """Return in words that another time step than the model file's was taken; empty if not."""
-    step, own = found.problem.subject.plant.timestep, plant_of(dataset).timestep
-    if step == own:
+    step = found.problem.dataset.source.timestep
+    if step == dataset.source.timestep or step is None:
         return ""
+    own = plant_of(dataset).timestep
     return (
         f"all of this was simulated at a time step of {1e3 * step:g} ms: at the model file's "
         f"{1e3 * own:g} ms more than noise was left, or what looked like a push. model.xml has it"

@@ -63,8 +63,8 @@ def refit(
     extra = space.size - fit.space.size
     way: Float64 = np.concatenate([screened.shift, screened.start])
     origin: Float64 = np.concatenate([begun.z, np.zeros(extra)])
-    forms = [False] * fit.space.size + [bool(each.grid) for each in quantities]
-    is_form: NDArray[np.bool_] = np.array(forms)
+    forms = screened.candidate.forms(problem.subject)
+    is_form = np.concatenate([np.zeros(fit.space.size, np.bool_), forms])
     ways: list[Float64] = []
     for part in _PARTS:
         there = origin + part * way
@@ -90,10 +90,7 @@ def _from_nominal(
 ) -> Fit:
     """Return where a refit comes to that begins at the nominal model."""
     space = fit.space.grown(screened.candidate)
-    quantities = screened.candidate.effect.quantities(
-        fit.space.problem.subject, screened.candidate.place
-    )
-    is_form = np.array([bool(each.grid) for each in quantities])
+    is_form = screened.candidate.forms(fit.space.problem.subject)
     base = np.r_[nominal.z, fit.z[nominal.z.size :]]
     half = np.where(is_form, screened.start, 0.5 * screened.start)
     sizes = [space.clip(np.r_[base, size]) for size in (screened.start, half)]
@@ -194,9 +191,7 @@ def _is_straight(known: Fit, down: Fit) -> bool:
         known: without the candidate, on the same rows.
         down: with it, and the derivative that led there.
     """
-    subject = down.space.problem.subject
-    newest = down.space.candidates[-1]
-    is_form = [bool(each.grid) for each in newest.effect.quantities(subject, newest.place)]
+    is_form = down.space.candidates[-1].forms(down.space.problem.subject)
     extra = down.z[known.space.size :]
     moved = np.r_[down.z[: known.space.size] - known.z, np.where(is_form, 0.0, extra)]
     rows = len(known.residual) - known.space.size

@@ -67,12 +67,11 @@ def _that_do_something(fit: Fit, candidate: Candidate, segments: tuple[int, ...]
     numbers keep their size, and are none of these.
     """
     problem = fit.space.problem
-    quantities = candidate.effect.quantities(problem.subject, candidate.place)
-    amounts = [index for index, each in enumerate(quantities) if index and not each.grid]
+    is_form = candidate.forms(problem.subject)
+    amounts = [index for index in range(1, len(is_form)) if not is_form[index]]
     own = fit.space.where(candidate)
-    forms = np.where([bool(each.grid) for each in quantities], fit.z[own], 0.0)
     alone = np.tile(fit.z, (len(amounts) + 1, 1))
-    alone[:, own] = forms
+    alone[:, own] = np.where(is_form, fit.z[own], 0.0)
     for row, index in enumerate(amounts):
         alone[row, own.start + index] = fit.z[own.start + index]
     found = problem.vector([fit.space.variant(z) for z in alone], segments)

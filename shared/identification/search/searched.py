@@ -118,6 +118,11 @@ class Left(NamedTuple):
     current: float
     by_all: float | None
 
+    @property
+    def least(self) -> float:
+        """Return what the current model leaves, or does once it is fitted to all recordings."""
+        return self.current if self.by_all is None else min(self.current, self.by_all)
+
 
 @dataclass
 class Search:
@@ -192,13 +197,12 @@ def is_open(found: Search) -> bool:
 
 
 def _is_much(found: Search, left: Left) -> bool:
-    least = min(left.current, np.inf if left.by_all is None else left.by_all)
     if found.accepted:
         if left.current >= left.nominal:
             return True
         most = BESIDE_A_DOUBT if found.doubted else np.inf
-        return least > max(BESIDE_A_NAME, min(MAY_BE_LEFT * left.base, most))
-    return least > NEARLY_NOISE
+        return left.least > max(BESIDE_A_NAME, min(MAY_BE_LEFT * left.base, most))
+    return left.least > NEARLY_NOISE
 
 
 def plain_losses(found: Search) -> tuple[Float64, Float64, Float64]:
