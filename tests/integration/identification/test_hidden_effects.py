@@ -89,6 +89,7 @@ def test_what_a_base_far_from_the_model_explains_is_told_from_nothing() -> None:
     assert any("far from the model file" in each for each in verdict.caveats)
 
 
+@pytest.mark.slow
 def test_a_base_that_is_off_in_many_numbers_at_once_is_told_from_nothing() -> None:
     """No number of it is surely far by itself: a servo can be weaker by so much."""
     _, tie = tied_with_base(PULLS)

@@ -11,7 +11,7 @@ pytestmark = pytest.mark.timeout(400)
 
 @pytest.mark.parametrize(("wish", "seed"), [
     ("external_contact@elbow in swings=0.22", 6006),
-    ("external_contact@yaw in sweep=1.66", 6002),
+    pytest.param("external_contact@yaw in sweep=1.66", 6002, marks=pytest.mark.slow),
 ])  # fmt: skip
 def test_what_is_plain_by_the_torque_that_was_missing_is_named(wish: str, seed: int):
     recipe = Recipe(arm="arm3", seconds=4.0, seed=seed, wishes=(wish_of(wish),), has_shares=False)

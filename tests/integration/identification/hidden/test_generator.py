@@ -80,6 +80,7 @@ def test_a_size_is_found_for_the_share_asked_for():
     assert truth.effect[0].share == pytest.approx(0.5, abs=0.03)
 
 
+@pytest.mark.slow
 def test_what_is_hidden_shows_in_the_recordings_to_fit_to():
     """The first drawn, a limit at the elbow, only the fastest held-out swing reaches."""
     recipe = Recipe(arm="arm3", seed=9500, shares=(0.4, 0.95), wishes=(Wish("torque_saturation"),))

@@ -60,6 +60,7 @@ def test_seen_from_the_nominal_model_it_comes_first(bent: tuple[Fit, Start]):
     assert [each.ratio for each in rough] == sorted(each.ratio for each in rough)
 
 
+@pytest.mark.slow
 def test_an_interval_that_looks_like_a_delay_of_half_of_it_is_told_from_it():
     wish = wish_of("sample_and_hold=0.0243")
     dataset, _ = simulated(Recipe(arm="arm3", seconds=3.0, train=2, test=1, seed=1, wishes=(wish,)))
