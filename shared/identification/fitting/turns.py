@@ -46,8 +46,6 @@ NEAR = About(1.005, 32, 5)
 one that is nearest to a command must be right to a hundredth of their interval."""
 _ABOUT = NEAR._replace(closer=1)
 """Where it was found by smooth commands, before the base is fitted with it."""
-_APART = 3.0
-"""Commands between two turns, from which it is sought with smooth ones, too."""
 _FEWEST, _MOST = 5, 256
 """Intervals tried first. Where it would take more, turns come so often that only their mean shows,
 and that is smooth."""
@@ -116,7 +114,7 @@ def aligned(
     if turning is None or z[turning.interval] <= 0.0:
         return z
     ways = [(space, z, about)]
-    if about is not NEAR and _are_far_apart(space, z, turning, segments):
+    if about is not NEAR:
         rough = _sought(space.smooth(), z, turning, segments, about, base)
         ways += [] if rough is None else [(space, rough, _ABOUT)]
     found = [_sought(where, begun, turning, segments, how, base) for where, begun, how in ways]
@@ -124,13 +122,6 @@ def aligned(
     if len(tries) == 1:
         return z
     return tries[int(np.argmin(_Cost(space, segments, base)(tries, segments)))]
-
-
-def _are_far_apart(space: Space, z: Float64, turning: Turning, segments: tuple[int, ...]) -> bool:
-    """Return whether some commands come between two turns: smooth ones say about as much then."""
-    at = space.problem.segments[segments[0]].recorded.command.at
-    every = float(np.median(np.diff(at))) if len(at) > 1 else np.inf
-    return float(z[turning.interval]) * turning.interval_probe > _APART * every
 
 
 def _sought(
