@@ -87,6 +87,7 @@ def make_subject(plant: Plant, has_tracker: bool = True) -> Subject:
         travel=np.full(count, 1.0),
         lowest=np.full(count, -0.5),
         speed=np.full(count, 1.0),
+        acceleration=np.full(count, 4.0),
         drive=np.full(count, 5.0),
     )
 

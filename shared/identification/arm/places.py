@@ -31,6 +31,8 @@ class Place:
     """(rad, m)."""
     speed: float
     """What it exceeds 2 % of the time, never 0 (rad/s, m/s)."""
+    acceleration: float
+    """The same (rad/s^2, m/s^2)."""
     inertia: float
     """About the joint, armature included, in the model's home posture (kg m^2, kg)."""
     drive: float
@@ -68,6 +70,7 @@ def place_of(subject: Subject, label: str) -> Place:
         travel=float(subject.travel[index]),
         lowest=float(subject.lowest[index]),
         speed=max(float(subject.speed[index]), 1e-3),
+        acceleration=max(float(subject.acceleration[index]), 1e-3),
         inertia=inertia,
         drive=max(float(subject.drive[index]), _IDLE * limit, 0.01 * inertia),
     )

@@ -42,6 +42,8 @@ class Subject:
     """float64[J], smallest position of each joint (rad, m)."""
     speed: Float64
     """float64[J], speed that each joint exceeds 2 % of the time (rad/s, m/s)."""
+    acceleration: Float64
+    """float64[J], the same of its acceleration (rad/s^2, m/s^2)."""
     drive: Float64
     """float64[J], torque that the recorded motion takes of each joint of the nominal arm, exceeded
     2 % of the time (N m, N)."""
@@ -110,7 +112,9 @@ def subject_of(dataset: Dataset, capacity: int = 128) -> Subject:
     nominal = Rollouts(plant, (), capacity)
     q = np.concatenate([each.q for each in dataset.trajectories])
     motions = [motion_of(each) for each in dataset.trajectories]
-    speeds = np.concatenate([each.qd for each in motions])
+    speeds, accelerations = (
+        np.concatenate([getattr(each, name) for each in motions]) for name in ("qd", "qdd")
+    )
     drives = [
         np.concatenate(
             [
@@ -132,6 +136,7 @@ def subject_of(dataset: Dataset, capacity: int = 128) -> Subject:
         travel=np.ptp(q, axis=0),
         lowest=q.min(axis=0),
         speed=np.quantile(np.abs(speeds), 0.98, axis=0),
+        acceleration=np.quantile(np.abs(accelerations), 0.98, axis=0),
         drive=np.max([np.quantile(np.abs(each), 0.98, axis=0) for each in drives], axis=0),
         recordings=dataset.trajectories,
     )

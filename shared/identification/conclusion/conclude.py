@@ -170,6 +170,7 @@ def _scored(found: Search, word: Word) -> tuple[Scored, ...]:
             )
             continue
         quantity = candidate.effect.quantities(found.problem.subject, candidate.place)[0]
+        space = tried.fit.space
         out.append(
             Scored(
                 effect=candidate.effect.name,
@@ -177,7 +178,7 @@ def _scored(found: Search, word: Word) -> tuple[Scored, ...]:
                 screen=screened.share,
                 gain=tried.gain.gain,
                 gain_interval=Interval(low=tried.gain.low, high=tried.gain.high),
-                value=float(tried.fit.space.values(tried.fit.z)[-1][0]),
+                value=float(space.values(tried.fit.z)[space.candidates.index(candidate)][0]),
                 unit=quantity.unit,
                 why_not=_why_not(tried, found, label, accepted, rivals, word),
             )

@@ -7,11 +7,13 @@ that is too coarse blames effects for what is its own fault.
 Coordinates are normalised: 0 is nominal, and 1 is a factor e or the scale of a sum.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from shared.identification.arm.places import place_of
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.sim.plant.kinematics import turned_axes
@@ -24,8 +26,12 @@ _CENTRE = 0.05
 """(m)."""
 LOOSE = 1.5
 """Of damping, armature and gains: a factor of 4.5 either way is unlikely."""
+_FAR = 4.0
+"""How far any of them may be, up or down: of what is a 400th of itself, a step shows nothing."""
 _MOST_FRICTION = 30.0
 """Beyond what the model file says, in units of it: small servos rub with ten times that."""
+_LEAST_FRICTION = 0.01
+"""Of what drives a joint: some model files have a stand-in for its friction."""
 
 
 @dataclass(frozen=True)
@@ -64,11 +70,12 @@ def base_parameters(subject: Subject) -> tuple[BaseParameter, ...]:
         ):
             nominal = float(getattr(model, field)[dof])
             if nominal > 0.0:
-                found.append(
-                    _factor(f"{word} {label}", unit, nominal, LOOSE, _setter(field, joint))
-                )
-        if (friction := _friction_scale(subject, dof)) > 0.0:
+                change = _setter(field, joint)
+                most = _most(subject, joint, nominal) if word == "armature" else _FAR
+                found.append(_factor(f"{word} {label}", unit, nominal, LOOSE, change, most))
+        if (friction := _friction_scale(subject, joint, dof)) > 0.0:
             nominal = float(model.dof_frictionloss[dof])
+            drive = place_of(subject, label).drive
             found.append(
                 BaseParameter(
                     name=f"friction_loss {label}",
@@ -77,7 +84,7 @@ def base_parameters(subject: Subject) -> tuple[BaseParameter, ...]:
                     is_factor=False,
                     scale=friction,
                     low=-nominal / friction,
-                    high=_MOST_FRICTION if nominal > 0.0 else 5.0,
+                    high=max(_MOST_FRICTION, drive / friction) if nominal > 0.0 else 5.0,
                     prior=LOOSE,
                     change=_setter("dof_frictionloss", joint),
                 )
@@ -131,9 +138,23 @@ def enter_base(parameters: tuple[BaseParameter, ...], x: Float64, row: Row) -> N
 
 
 def _factor(
-    name: str, unit: str, nominal: float, prior: float, change: Callable[[Row, float], None]
+    name: str,
+    unit: str,
+    nominal: float,
+    prior: float,
+    change: Callable[[Row, float], None],
+    most: float = _FAR,
 ) -> BaseParameter:
-    return BaseParameter(name, unit, nominal, True, 1.0, -4.0, 4.0, prior, change)
+    return BaseParameter(name, unit, nominal, True, 1.0, -_FAR, most, prior, change)
+
+
+def _most(subject: Subject, joint: int, nominal: float) -> float:
+    """Return how far up an armature may be: what all of the drive could just accelerate.
+
+    Model files of geared arms often have a stand-in for it, a hundredth of what the arm has.
+    """
+    place = place_of(subject, subject.joints[joint])
+    return max(_FAR, math.log(place.drive / place.acceleration / nominal))
 
 
 def _setter(field: str, joint: int) -> Callable[[Row, float], None]:
@@ -145,19 +166,20 @@ def _setter(field: str, joint: int) -> Callable[[Row, float], None]:
     return change
 
 
-def _friction_scale(subject: Subject, dof: int) -> float:
+def _friction_scale(subject: Subject, joint: int, dof: int) -> float:
     """Return how much friction is a unit; 0 where the model has none and it is to be found.
 
     A PR2's joints are known to rub, the model only does not know how much; of another arm a
     friction that its model lacks is a cause to be named.
     """
     model = subject.nominal.model
-    if model.dof_frictionloss[dof] > 0.0:
-        return float(model.dof_frictionloss[dof])
+    nominal = float(model.dof_frictionloss[dof])
     if subject.control != "pose":
-        return 0.0
-    joint = int(model.dof_jntid[dof])
-    return 0.05 * float(model.jnt_actfrcrange[joint, 1])
+        least = _LEAST_FRICTION * place_of(subject, subject.joints[joint]).drive
+        return max(nominal, least) if nominal > 0.0 else 0.0
+    if nominal > 0.0:
+        return nominal
+    return 0.05 * float(model.jnt_actfrcrange[int(model.dof_jntid[dof]), 1])
 
 
 def _gains(subject: Subject) -> list[BaseParameter]:

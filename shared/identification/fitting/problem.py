@@ -15,7 +15,7 @@ from shared.identification.dataset.types import Dataset, Float64
 from shared.identification.effect import Candidate
 from shared.identification.fitting.parameters import BaseParameter, enter_base
 from shared.identification.noise.floor import Noise
-from shared.sim.plant.rollouts import Reports, Rollouts
+from shared.sim.plant.rollouts import Entry, Reports, Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import pose_error, smoothed
 from shared.sim.plant.structure import Structure
@@ -127,7 +127,7 @@ class Problem:
             if structure not in self._structures:
                 self._structures[structure] = Rollouts(self.subject.plant, structure, 64)
             work = [
-                (self._entry(variants[index]), self.segments[segment].recorded)
+                (self.entry(variants[index]), self.segments[segment].recorded)
                 for index in members
                 for segment in segments
             ]
@@ -211,7 +211,8 @@ class Problem:
             out = np.concatenate([out[:rows], more[:rows]], axis=1)
         return np.nan_to_num(out, nan=DIVERGED, posinf=DIVERGED, neginf=-DIVERGED)
 
-    def _entry(self, variant: Variant) -> "_Enter":
+    def entry(self, variant: Variant) -> Entry:
+        """Return what lets a variant into an arm."""
         return _Enter(self.parameters, variant)
 
 

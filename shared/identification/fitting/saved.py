@@ -33,7 +33,7 @@ def save(folder: Path, dataset: Dataset, seed: int, found: Search) -> None:
         model=repr(dataset.source),
         seed=seed,
         parameters=[each.name for each in found.problem.parameters],
-        parts=found.parts.z.tolist(),
+        parts=found.base_parts.z.tolist(),
         whole=found.base.z.tolist(),
         starts_agree=found.base.starts_agree,
     )

@@ -13,15 +13,15 @@ from shared.identification.verdict import Unexplained
 
 
 def fresh(found: Search, seed: int) -> Search:
-    """Return a search that has just begun once more, for one more try with other losses."""
+    """Return the same as one that has just begun, for one more try with other losses."""
     return replace(
         found,
         rng=np.random.default_rng([seed, 2]),
         seen=Seen(),
-        screened={},
-        tried={},
-        accepted=[],
-        rivals=[],
+        screened=dict(found.screened),
+        tried=dict(found.tried),
+        accepted=list(found.accepted),
+        rivals=list(found.rivals),
     )
 
 
@@ -46,5 +46,6 @@ def leave_out(found: Search, left: Sequence[Unexplained]) -> bool:
         return False
     nothing = found.base.space.variant(np.zeros(found.base.space.size))
     found.nominal_losses = stretches(problem, nothing, test)
-    found.base_losses = found.current_losses = losses
+    found.base_losses = losses
+    found.current_losses = stretches(problem, found.current.variant, test)
     return True

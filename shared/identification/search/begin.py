@@ -24,8 +24,10 @@ from shared.identification.fitting.space import Space
 from shared.identification.gate.held_out import stretches
 from shared.identification.noise.floor import noise_of
 from shared.identification.progress import Progress
+from shared.identification.search.bare import lacking, loads_of, screened_of, with_drives
+from shared.identification.search.family import Family
 from shared.identification.search.screen import candidates_of
-from shared.identification.search.searched import Search
+from shared.identification.search.searched import Search, join
 
 FAR_FROM_KNOWN = 3.0
 """Standard deviations from what is known of a link at which the base itself is doubted."""
@@ -61,6 +63,7 @@ def begin(
     creep = creep_of(subject)
     if fits is not None and not {each.name for each in (*known, *creep)} >= set(fits.names):
         fits = None
+    candidates, ruled_out = candidates_of(catalogue, subject, without)
     problem = Problem(subject, dataset, known, noise)
     if not noise.is_measured:
         progress("noise floor", 0.5, "no repeats: from what the base leaves")
@@ -71,17 +74,23 @@ def begin(
     progress("base fit", 0.0, f"{len(known)} parameters" + ("" if fits is None else ", kept"))
     space = Space(problem)
     done = with_creep(fit_base(space, rng), creep) if fits is None else fit_again(space, fits)
+    lacks = lacking(done.whole.space, candidates)
+    if lacks:
+        progress("base fit", 0.5, "with friction and rotors of all joints that the file lacks")
+    family = with_drives(done.whole, lacks, rng)
+    best = done.whole if family is None else family.fit
     problem = done.whole.space.problem
-    if fits is None and (doubted := doubted_of(done.whole)):
+    if fits is None and (doubted := doubted_of(best)):
         # What is known of a link does not hold, so the base may not bend it: what is wrong there
         # is looked for like any other cause.
         bent = ", ".join(problem.parameters[index].name for index in doubted)
         progress("base fit", 0.5, f"without {bent}")
         done = _held(done, doubted)
         problem = done.whole.space.problem
-    candidates, ruled_out = candidates_of(catalogue, subject, without)
+        family = with_drives(done.whole, lacks, rng, loads_of(candidates))
     return begun_with(
         done,
+        family,
         seed=seed,
         candidates=candidates,
         ruled_out=ruled_out,
@@ -91,6 +100,7 @@ def begin(
 
 def begun_with(
     done: BaseFits,
+    family: Family | None,
     *,
     seed: int,
     candidates: tuple[Candidate, ...],
@@ -101,6 +111,7 @@ def begun_with(
 
     Args:
         done: the fits.
+        family: what the model file lacks of the drives, if anything.
         seed: of everything random.
         candidates: what is looked for.
         ruled_out: effects that cannot be, and why.
@@ -109,7 +120,7 @@ def begun_with(
     space = done.whole.space
     problem, test = space.problem, space.problem.of("test")
     losses = stretches(problem, space.variant(done.whole.z), test)
-    return Search(
+    found = Search(
         problem=problem,
         rng=np.random.default_rng([seed, 1]),
         candidates=candidates,
@@ -123,6 +134,11 @@ def begun_with(
         base_losses=losses,
         current_losses=losses,
     )
+    if family is not None:
+        found.screened |= {each.label: screened_of(family.fit, each) for each in family.gains}
+        join(found, family)
+        found.parts = found.current
+    return found
 
 
 def begin_without(found: Search, gone: Sequence[int], *, seed: int) -> Search:
@@ -134,8 +150,13 @@ def begin_without(found: Search, gone: Sequence[int], *, seed: int) -> Search:
         seed: of everything random.
     """
     known = found.problem.parameters
+    done = _held(BaseFits(found.nominal, found.base_parts, found.base), gone)
+    lacks = lacking(done.whole.space, found.candidates)
     return begun_with(
-        _held(BaseFits(found.nominal, found.parts, found.base), gone),
+        done,
+        with_drives(
+            done.whole, lacks, np.random.default_rng([seed, 3]), loads_of(found.candidates)
+        ),
         seed=seed,
         candidates=found.candidates,
         ruled_out=found.ruled_out,

@@ -81,9 +81,7 @@ def look_elsewhere(
     together = polish(space, np.r_[fit.z, np.zeros(space.size - fit.space.size)], train, _STEPS)
     after = stretches(problem, space.variant(together.z), test)
     kept = [
-        each
-        for each in others
-        if compare(_losses_without(together, each, test), after, rng).is_sure
+        each for each in others if compare(left_without(together, each, test), after, rng).is_sure
     ]
     if len(kept) < max(_FEWEST, _MOST * len(others)):
         return None  # what a few joints make up for may be something else
@@ -94,11 +92,11 @@ def look_elsewhere(
     after = stretches(problem, final.variant(found.z), test)
     if not compare(losses, after, rng).is_sure:
         return None
-    gains = {each: compare(_losses_without(found, each, test), after, rng) for each in kept}
+    gains = {each: compare(left_without(found, each, test), after, rng) for each in kept}
     return Family(found, after, gains)
 
 
-def _losses_without(fit: Fit, candidate: Candidate, test: tuple[int, ...]) -> Float64:
+def left_without(fit: Fit, candidate: Candidate, test: tuple[int, ...]) -> Float64:
     """Return held-out losses where the rest makes up for a missing effect as well as it can.
 
     As far as the fit's derivative says, and no worse than if it did not.

@@ -33,6 +33,7 @@ from shared.identification.search.searched import (
     Tried,
     cosine,
     is_open,
+    join,
     judged,
     plain_losses_of,
     so_far,
@@ -151,7 +152,7 @@ def _round(
     found.rivals.append(rivals)
     found.current, found.current_losses = best.fit, best.losses
     if family is not None:
-        _join(found, family)
+        join(found, family)
     if rivals and not _goes_on(found):
         return False
     if found.parts.space.problem is found.problem:
@@ -202,16 +203,6 @@ def _elsewhere(
         and compare(after[one.candidate], family.losses, found.rng).surely <= 0.0
     )
     return (best, rivals, None) if left else (taken, (), family)
-
-
-def _join(found: Search, family: Family) -> None:
-    """Take what was found at other joints."""
-    for candidate, gain in family.gains.items():
-        screened = found.screened[candidate.label]
-        found.accepted.append(Tried(screened, family.fit, gain, family.losses, is_relative=True))
-        found.tried[candidate.label] = found.accepted[-1]
-        found.rivals.append(())
-    found.current, found.current_losses = family.fit, family.losses
 
 
 def _explains_event(

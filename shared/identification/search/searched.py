@@ -13,6 +13,7 @@ from shared.identification.gate.certainty import sureness
 from shared.identification.gate.foretold import SURELY, Foretold, Held
 from shared.identification.gate.held_out import Gain, Taken, compare, plain_stretches
 from shared.identification.gate.left_out import left_out
+from shared.identification.search.family import Family
 from shared.identification.search.screen import Screened, Seen
 
 ALIKE = 0.02
@@ -166,6 +167,14 @@ class Search:
     asked."""
 
     @property
+    def base_parts(self) -> Fit:
+        """Return the base's fit on short parts, of a search that has just begun.
+
+        Causes are there from the begin only under torque control, where all parts are short.
+        """
+        return self.base if self.accepted else self.parts
+
+    @property
     def left(self) -> Left:
         """Return how much is left of what is new in each block: there small causes show."""
         return Left(
@@ -183,6 +192,16 @@ class Search:
     def told(self) -> Fit:
         """Return the fit that sizes are told from."""
         return self.current if self.final is None else self.final
+
+
+def join(found: Search, family: Family) -> None:
+    """Take what was found at several joints at once."""
+    for candidate, gain in family.gains.items():
+        screened = found.screened[candidate.label]
+        found.accepted.append(Tried(screened, family.fit, gain, family.losses, is_relative=True))
+        found.tried[candidate.label] = found.accepted[-1]
+        found.rivals.append(())
+    found.current, found.current_losses = family.fit, family.losses
 
 
 def is_open(found: Search) -> bool:

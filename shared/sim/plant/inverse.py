@@ -8,6 +8,18 @@ import numpy as np
 
 from shared.sim.arm import Float64
 from shared.sim.plant.plant import Plant
+from shared.sim.plant.row import Row
+
+
+def model_of(row: Row) -> mujoco.MjModel:
+    """Return a model of its own for an arm, with the fields that it has changed."""
+    model = copy.copy(row.model)
+    for name, values in row.fields.items():
+        owner = model.opt if name.startswith("opt.") else model
+        field = getattr(owner, name.removeprefix("opt."))
+        field[:] = values.reshape(field.shape)
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
 
 
 def inverse_dynamics(

@@ -167,3 +167,22 @@ def test_what_else_is_known_of_links_is_how_they_turn_and_where_they_weigh(subje
     assert row.field("body_inertia")[fore] == pytest.approx(np.exp(0.1) * model.body_inertia[fore])
     assert "body_mass" not in row.fields
     assert any(each.name.startswith("centre_") for each in loose)
+
+
+_STAND_INS = """<mujoco><compiler angle="radian"/><option gravity="0 0 0"/>
+<worldbody><body><joint name="turn" axis="0 0 1" armature="0.001" frictionloss="0.01"/>
+<inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body></worldbody>
+<actuator><motor name="turn" joint="turn"/></actuator></mujoco>"""
+
+
+def test_stand_ins_for_rotor_and_friction_may_be_far_from_what_the_drive_gives(tmp_path: Path):
+    path = tmp_path / "turntable.xml"
+    path.write_text(_STAND_INS)
+    subject = make_subject(mjcf(path, "torque", ["turn"], ["turn"], ""))
+    found = {each.name: each for each in base_parameters(subject)}
+    # 5 N m at 4 rad/s^2
+    assert found["armature turn"].value(found["armature turn"].high) == pytest.approx(1.25)
+    friction = found["friction_loss turn"]
+    assert friction.scale == pytest.approx(0.05)
+    assert friction.value(friction.low) == pytest.approx(0.0)
+    assert friction.value(friction.high) >= 5.0 - 0.01

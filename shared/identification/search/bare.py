@@ -1,0 +1,111 @@
+"""Begins with what a model file lacks that knows nothing of drives: friction and rotors.
+
+Most model files of real arms have links and no friction. Where that is as large as their weight,
+a base without it has its links bent to where nothing else can be seen any more. So it is fitted
+at all joints at once before anything is looked for, from where the torques lead. What is surely
+needed there is named like any other cause. So is a load at the tool, where links would have to be
+bent further than is believable without it: with as much missing nothing would be seen beside it.
+"""
+
+from collections.abc import Sequence
+from itertools import groupby
+
+import numpy as np
+
+from shared.identification.dataset.types import Float64
+from shared.identification.effect import Candidate
+from shared.identification.fitting.fit import Fit, polish
+from shared.identification.fitting.space import Space
+from shared.identification.fitting.torques import by_torques
+from shared.identification.gate.held_out import compare, stretches
+from shared.identification.search.family import Family, left_without
+from shared.identification.search.screen import Screened
+
+_OF_DRIVES = ("coulomb_friction", "rotor_inertia", "viscous_friction")
+"""Effects that sit only where the model file has nothing of the kind."""
+_CARRIED = "payload"
+_MUCH_BETTER = 15.0
+"""By so much less, as part of the cost, a load of more numbers is taken for one of fewer."""
+_FEWEST = 2
+"""Joints: a single one is found like any other cause."""
+_MOST = 0.5
+"""Share of the joints at which an effect has to be."""
+_STEPS = 6
+"""Derivatives of a fit."""
+
+
+def lacking(space: Space, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Return what a model file lacks of drives; nothing unless commands are torques."""
+    if space.problem.subject.control != "torque":
+        return ()
+    found = [each for each in candidates if each.effect.name in _OF_DRIVES]
+    return tuple(found) if len({each.place for each in found}) >= _FEWEST else ()
+
+
+def loads_of(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Return what the tool may carry, fewest numbers first."""
+    return tuple(each for each in candidates if each.effect.name == _CARRIED)
+
+
+def with_drives(
+    base: Fit,
+    lacks: tuple[Candidate, ...],
+    rng: np.random.Generator,
+    loads: tuple[Candidate, ...] = (),
+) -> Family | None:
+    """Return what the drives have that the file lacks; None if nothing surely is there.
+
+    Args:
+        base: without any cause.
+        lacks: what there may be, effect by effect.
+        rng: draws.
+        loads: of which there may be one, too, fewest numbers first.
+    """
+    if not lacks:
+        return None
+    problem = base.space.problem
+    train, test = problem.of("train"), problem.of("test")
+    before = stretches(problem, base.variant, test)
+    together = _fitted(Space(problem, lacks), train)
+    for load in loads:
+        other = _fitted(Space(problem, (*lacks, load)), train)
+        if other.cost < together.cost - _MUCH_BETTER:
+            together = other
+    kept = _needed(together, test, rng)
+    if not kept:
+        return None
+    is_whole = len(kept) == len(together.space.candidates)
+    fit = together if is_whole else _fitted(Space(problem, kept), train)
+    after = stretches(problem, fit.variant, test)
+    if not compare(before, after, rng).is_sure:
+        return None
+    gains = {each: compare(left_without(fit, each, test), after, rng) for each in kept}
+    return Family(fit, after, gains)
+
+
+def screened_of(fit: Fit, candidate: Candidate) -> Screened:
+    """Return a candidate of a fit as if it had been looked at there."""
+    own = np.zeros(fit.space.size, np.bool_)
+    own[fit.space.where(candidate)] = True
+    basis = np.linalg.qr(fit.jacobian[:, ~own]).Q
+    moved = fit.jacobian[:, own] @ fit.z[own]
+    moved = moved - basis @ (basis.T @ moved)
+    power = float(moved @ moved)
+    share = power / max(power + float(fit.residual @ fit.residual), 1e-12)
+    return Screened(candidate, fit.z[own], np.zeros(fit.space.base_size), share, np.empty(0))
+
+
+def _fitted(space: Space, train: tuple[int, ...]) -> Fit:
+    return polish(space, by_torques(space), train, _STEPS)
+
+
+def _needed(fit: Fit, test: tuple[int, ...], rng: np.random.Generator) -> tuple[Candidate, ...]:
+    """Return those without which a fit is surely worse; of a joint's, what most joints have."""
+    after: Float64 = stretches(fit.space.problem, fit.variant, test)
+    out: list[Candidate] = []
+    for name, group in groupby(fit.space.candidates, lambda each: each.effect.name):
+        own = list(group)
+        sure = [each for each in own if compare(left_without(fit, each, test), after, rng).is_sure]
+        is_most = name == _CARRIED or len(sure) >= max(_FEWEST, _MOST * len(own))
+        out += sure if is_most else []
+    return tuple(out)
