@@ -111,9 +111,10 @@ def one_for_many(found: Search, train: tuple[int, ...], test: tuple[int, ...]) -
         if len(many) < 2 or any(one.is_event for one in many):
             continue
         kept = [one for one in found.accepted if one.candidate.effect.name != name]
+        taken = {one.candidate for one in found.accepted}
         numbers = sum(one.numbers for one in many)
         for other in found.tried.values():
-            is_fewer = other.candidate.effect.name != name and other.numbers <= numbers
+            is_fewer = other.candidate not in taken and other.numbers <= numbers
             if not is_fewer or other.is_event or not other.gain.is_sure:
                 continue
             fit = _instead(found, {one.candidate for one in many}, other, train)

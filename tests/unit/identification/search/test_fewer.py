@@ -46,6 +46,15 @@ def test_one_cause_that_does_as_well_is_taken_for_two_of_one_effect(tmp_path: Pa
     assert found.current_losses.mean() < 1.3
 
 
+def test_what_was_taken_already_is_not_taken_for_others_as_well(searches: Searches):
+    """Drag of the elbow would do for both torques, but it is there."""
+    base, left = np.full(8, 10.0), np.linspace(1.0, 1.2, 8)
+    drag, elbow, lift = (searches.tried(each, base, left) for each in (DRAG, ELBOW, LIFT))
+    found = searches.search(base, lift, before=(drag, elbow), tried=(drag, elbow, lift))
+    one_for_many(found, found.problem.of("train"), found.problem.of("test"))
+    assert [each.candidate for each in found.accepted] == [DRAG, ELBOW, LIFT]
+
+
 def a_tie_and_then_drag(searches: Searches) -> Search:
     """Return a search that took a torque of the elbow, no better than the lift's, and then drag."""
     bad, good = np.full(4, 9.0), np.full(4, 5.0)
