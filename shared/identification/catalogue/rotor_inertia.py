@@ -22,11 +22,11 @@ class RotorInertia:
         return tuple(place.label for place in moving(subject) if known[place.dof] == 0.0)
 
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
-        """Return torque over acceleration."""
+        """Return torque over acceleration; at most what all of the drive could just speed up."""
         joint = place_of(subject, place)
         full = joint.drive / joint.acceleration
         unit = "kg" if joint.is_sliding else "kg m^2"
-        return (Quantity("inertia", unit, 0.0, 4.0 * full, probe=0.1 * full),)
+        return (Quantity("inertia", unit, 0.0, full, probe=0.1 * full),)
 
     def structure(self, subject: Subject, place: str) -> Structure:
         """Return nothing: every joint may have a rotor."""

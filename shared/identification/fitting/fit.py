@@ -190,10 +190,14 @@ def floor_from_base(space: Space) -> Noise:
     much better they are, not by what they leave.
     """
     parts = _on_parts(space)
-    pieces = parts.problem.of("train")
-    fit = polish(parts, np.zeros(space.size), pieces, 4)
+    return floor_at(space, polish(parts, np.zeros(space.size), parts.problem.of("train"), 4).z)
+
+
+def floor_at(space: Space, z: Float64) -> Noise:
+    """Return the same from what is left at a vector, float64[n]."""
+    parts = _on_parts(space)
     problem, noise = parts.problem, parts.problem.noise
-    each = problem.residuals([parts.variant(fit.z)], pieces)[0]
+    each = problem.residuals([parts.variant(z)], problem.of("train"))[0]
     scale = np.maximum(np.sqrt(_usual_power(each, problem.subject.control) / _MEDIAN), 1.0)
     count = len(noise.joints)
     tracker = None if noise.tracker is None else noise.tracker * scale[count:]

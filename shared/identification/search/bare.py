@@ -8,16 +8,19 @@ bent further than is believable without it: with as much missing nothing would b
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import groupby
 
 import numpy as np
 
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
-from shared.identification.fitting.fit import Fit, polish
+from shared.identification.fitting.fit import Fit, floor_at, polish
 from shared.identification.fitting.space import Space
 from shared.identification.fitting.torques import by_torques
+from shared.identification.gate.certainty import is_there
 from shared.identification.gate.held_out import compare, stretches
+from shared.identification.noise.floor import Noise
 from shared.identification.search.family import Family, left_without
 from shared.identification.search.screen import Screened
 
@@ -26,6 +29,8 @@ _OF_DRIVES = ("coulomb_friction", "rotor_inertia", "viscous_friction")
 _CARRIED = "payload"
 _MUCH_BETTER = 15.0
 """By so much less, as part of the cost, a load of more numbers is taken for one of fewer."""
+_AT_MOST = 2.0
+"""Noise floors, in those of a base with drives where the torques lead, not yet at its best."""
 _FEWEST = 2
 """Joints: a single one is found like any other cause."""
 _MOST = 0.5
@@ -40,6 +45,19 @@ def lacking(space: Space, candidates: Sequence[Candidate]) -> tuple[Candidate, .
         return ()
     found = [each for each in candidates if each.effect.name in _OF_DRIVES]
     return tuple(found) if len({each.place for each in found}) >= _FEWEST else ()
+
+
+def no_more(noise: Noise, space: Space) -> Noise:
+    """Return a noise floor that is not much more than what is left once the drives are there.
+
+    An arm without its rotors spins off: what is left of that says nothing of noise.
+
+    Args:
+        noise: from what the base leaves without them.
+        space: with them.
+    """
+    at_most = _AT_MOST * floor_at(space, by_torques(space)).joints
+    return replace(noise, joints=np.minimum(noise.joints, at_most))
 
 
 def loads_of(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
@@ -100,12 +118,19 @@ def _fitted(space: Space, train: tuple[int, ...]) -> Fit:
 
 
 def _needed(fit: Fit, test: tuple[int, ...], rng: np.random.Generator) -> tuple[Candidate, ...]:
-    """Return those without which a fit is surely worse; of a joint's, what most joints have."""
+    """Return those without which a fit is surely worse.
+
+    Of a joint's, what most joints need; at the others it is there, too, if what was fitted to says
+    so: an arm of which one joint does not rub makes up for that by a rotor that nothing moves.
+    """
+    train = fit.space.problem.of("train")
     after: Float64 = stretches(fit.space.problem, fit.variant, test)
     out: list[Candidate] = []
     for name, group in groupby(fit.space.candidates, lambda each: each.effect.name):
         own = list(group)
         sure = [each for each in own if compare(left_without(fit, each, test), after, rng).is_sure]
-        is_most = name == _CARRIED or len(sure) >= max(_FEWEST, _MOST * len(own))
-        out += sure if is_most else []
+        if name == _CARRIED:
+            out += sure
+        elif len(sure) >= max(_FEWEST, _MOST * len(own)):
+            out += [each for each in own if each in sure or is_there(fit, each, train)]
     return tuple(out)

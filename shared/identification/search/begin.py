@@ -24,7 +24,7 @@ from shared.identification.fitting.space import Space
 from shared.identification.gate.held_out import stretches
 from shared.identification.noise.floor import noise_of
 from shared.identification.progress import Progress
-from shared.identification.search.bare import lacking, loads_of, screened_of, with_drives
+from shared.identification.search.bare import lacking, loads_of, no_more, screened_of, with_drives
 from shared.identification.search.family import Family
 from shared.identification.search.screen import candidates_of
 from shared.identification.search.searched import Search, join
@@ -68,6 +68,8 @@ def begin(
     if not noise.is_measured:
         progress("noise floor", 0.5, "no repeats: from what the base leaves")
         noise = floor_from_base(Space(problem))
+        if lacks := lacking(Space(problem), candidates):
+            noise = no_more(noise, Space(problem, lacks))
     if fits is not None:
         known = tuple(each for each in (*known, *creep) if each.name in fits.names)
     problem = Problem(subject, dataset, known, noise)

@@ -34,5 +34,5 @@ def test_it_sits_where_the_model_has_none_and_may_be_all_that_the_drive_speeds_u
     assert EFFECT.places(bare) == ("turn",)
     (inertia,) = EFFECT.quantities(bare, "turn")
     assert inertia.unit == "kg m^2"
-    assert inertia.high == pytest.approx(4.0 * 5.0 / 4.0)
+    assert inertia.high == pytest.approx(5.0 / 4.0)
     assert EFFECT.places(_turntable(tmp_path, 0.01)) == ()

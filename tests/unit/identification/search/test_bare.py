@@ -9,7 +9,7 @@ import pytest
 from shared.identification.fitting.fit import Fit
 from shared.identification.fitting.problem import Problem
 from shared.identification.fitting.space import Space
-from shared.identification.search.bare import lacking, loads_of, screened_of, with_drives
+from shared.identification.search.bare import lacking, loads_of, no_more, screened_of, with_drives
 from tests.arms import JOINTS, make_plant, make_subject
 from tests.geared import FRICTION, candidates, problem_of_geared
 
@@ -48,6 +48,16 @@ def test_a_load_is_found_with_them_where_there_is_one(tmp_path: Path, load: floa
     carried = [each for each in found.gains if each.effect.name == "payload"]
     sizes = [space.values(found.fit.z)[space.candidates.index(each)][0] for each in carried]
     assert sizes == ([pytest.approx(load, rel=0.05)] if load else [])
+
+
+def test_what_an_arm_without_rotors_leaves_says_nothing_of_noise(tmp_path: Path):
+    problem = problem_of_geared(tmp_path, is_bare=True)
+    read = replace(problem.noise, joints=np.full(len(JOINTS), 1e-5))
+    space = Space(replace(problem, noise=read), candidates(problem, *DRIVES))
+    wild = replace(problem.noise, joints=np.full(len(JOINTS), 20.0))
+    assert no_more(wild, space).joints.max() < 5e-3
+    calm = replace(problem.noise, joints=np.full(len(JOINTS), 1e-6))
+    assert no_more(calm, space).joints == pytest.approx(calm.joints)
 
 
 def test_nothing_is_lacking_where_the_file_has_it_or_a_servo_holds_the_arm(tmp_path: Path):
