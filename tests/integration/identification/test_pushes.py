@@ -9,9 +9,10 @@ from shared.identification.hidden.recipe import Recipe, wish_of
 pytestmark = pytest.mark.timeout(400)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("wish", "seed"), [
     ("external_contact@elbow in swings=0.22", 6006),
-    pytest.param("external_contact@yaw in sweep=1.66", 6002, marks=pytest.mark.slow),
+    ("external_contact@yaw in sweep=1.66", 6002),
 ])  # fmt: skip
 def test_what_is_plain_by_the_torque_that_was_missing_is_named(wish: str, seed: int):
     recipe = Recipe(arm="arm3", seconds=4.0, seed=seed, wishes=(wish_of(wish),), has_shares=False)

@@ -74,10 +74,9 @@ def recording(
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize(
-    ("seconds", "excess"), [(4.0, 0.0), pytest.param(5.0, LAW["excess"], marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("seconds", "excess"), [(4.0, 0.0), (5.0, LAW["excess"])])
 def test_a_servos_friction_is_told_by_its_laws(tmp_path: Path, seconds: float, excess: float):
     path = tmp_path / "servo.xml"
     path.write_text(MODEL)

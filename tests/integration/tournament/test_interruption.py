@@ -67,6 +67,7 @@ def test_killed_with_its_actor_it_goes_on_and_plays_the_bouts_of_one_never_stopp
         assert getattr(mine, name).tobytes() == getattr(its, name).tobytes(), name
 
 
+@pytest.mark.slow
 def test_interrupted_it_stops_in_order_and_says_how_to_go_on(tmp_path: Path):
     run = a_run(tmp_path / "run")
     folder = run / "tournament"

@@ -112,6 +112,7 @@ def test_an_interrupted_run_is_resumed_though_its_newest_checkpoint_is_damaged(
     assert newest.name in (folder / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_a_full_disk_ends_the_run_and_costs_nothing(disk: Path) -> None:
     folder, filler = disk / "run", disk / "filler"
     with training(folder, overrides=LONGER) as process:
