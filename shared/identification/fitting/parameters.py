@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shared.identification.arm.places import place_of
+from shared.identification.arm.places import Place, place_of
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.sim.plant.kinematics import turned_axes
@@ -63,19 +63,18 @@ def base_parameters(subject: Subject) -> tuple[BaseParameter, ...]:
     found: list[BaseParameter] = []
     model = subject.nominal.model
     for joint, label in enumerate(subject.joints):
-        dof = int(model.joint(subject.plant.mj_joint(label)).dofadr[0])
+        place = place_of(subject, label)
         for field, word, unit in (
             ("dof_damping", "damping", "N m s/rad"),
             ("dof_armature", "armature", "kg m^2"),
         ):
-            nominal = float(getattr(model, field)[dof])
+            nominal = float(getattr(model, field)[place.dof])
             if nominal > 0.0:
                 change = _setter(field, joint)
-                most = _most(subject, joint, nominal) if word == "armature" else _FAR
+                most = _most(place, nominal) if word == "armature" else _FAR
                 found.append(_factor(f"{word} {label}", unit, nominal, LOOSE, change, most))
-        if (friction := _friction_scale(subject, joint, dof)) > 0.0:
-            nominal = float(model.dof_frictionloss[dof])
-            drive = place_of(subject, label).drive
+        if (friction := _friction_scale(subject, place)) > 0.0:
+            nominal = float(model.dof_frictionloss[place.dof])
             found.append(
                 BaseParameter(
                     name=f"friction_loss {label}",
@@ -84,7 +83,7 @@ def base_parameters(subject: Subject) -> tuple[BaseParameter, ...]:
                     is_factor=False,
                     scale=friction,
                     low=-nominal / friction,
-                    high=max(_MOST_FRICTION, drive / friction) if nominal > 0.0 else 5.0,
+                    high=max(_MOST_FRICTION, place.drive / friction) if nominal > 0.0 else 5.0,
                     prior=LOOSE,
                     change=_setter("dof_frictionloss", joint),
                 )
@@ -148,12 +147,11 @@ def _factor(
     return BaseParameter(name, unit, nominal, True, 1.0, -_FAR, most, prior, change)
 
 
-def _most(subject: Subject, joint: int, nominal: float) -> float:
+def _most(place: Place, nominal: float) -> float:
     """Return how far up an armature may be: what all of the drive could just accelerate.
 
     Model files of geared arms often have a stand-in for it, a hundredth of what the arm has.
     """
-    place = place_of(subject, subject.joints[joint])
     return max(_FAR, math.log(place.drive / place.acceleration / nominal))
 
 
@@ -166,20 +164,20 @@ def _setter(field: str, joint: int) -> Callable[[Row, float], None]:
     return change
 
 
-def _friction_scale(subject: Subject, joint: int, dof: int) -> float:
+def _friction_scale(subject: Subject, place: Place) -> float:
     """Return how much friction is a unit; 0 where the model has none and it is to be found.
 
     A PR2's joints are known to rub, the model only does not know how much; of another arm a
     friction that its model lacks is a cause to be named.
     """
     model = subject.nominal.model
-    nominal = float(model.dof_frictionloss[dof])
+    nominal = float(model.dof_frictionloss[place.dof])
     if subject.control != "pose":
-        least = _LEAST_FRICTION * place_of(subject, subject.joints[joint]).drive
+        least = _LEAST_FRICTION * place.drive
         return max(nominal, least) if nominal > 0.0 else 0.0
     if nominal > 0.0:
         return nominal
-    return 0.05 * float(model.jnt_actfrcrange[int(model.dof_jntid[dof]), 1])
+    return 0.05 * float(model.jnt_actfrcrange[place.joint, 1])
 
 
 def _gains(subject: Subject) -> list[BaseParameter]:
