@@ -76,12 +76,12 @@ def begin(
     progress("base fit", 0.0, f"{len(known)} parameters" + ("" if fits is None else ", kept"))
     space = Space(problem)
     done = with_creep(fit_base(space, rng), creep) if fits is None else fit_again(space, fits)
-    lacks = lacking(done.whole.space, candidates)
-    if lacks:
-        progress("base fit", 0.5, "with friction and rotors of all joints that the file lacks")
-    family = with_drives(done.whole, lacks, rng)
-    best = done.whole if family is None else family.fit
     problem = done.whole.space.problem
+    if lacking(done.whole.space, candidates):
+        progress("base fit", 0.5, "with friction and rotors of all joints that the file lacks")
+    is_held = any(each not in problem.parameters for each in released)
+    family = _drives(done, candidates, seed, is_held)
+    best = done.whole if family is None else family.fit
     if fits is None and (doubted := doubted_of(best)):
         # What is known of a link does not hold, so the base may not bend it: what is wrong there
         # is looked for like any other cause.
@@ -89,7 +89,7 @@ def begin(
         progress("base fit", 0.5, f"without {bent}")
         done = _held(done, doubted)
         problem = done.whole.space.problem
-        family = with_drives(done.whole, lacks, rng, loads_of(candidates))
+        family = _drives(done, candidates, seed, is_held=True)
     return begun_with(
         done,
         family,
@@ -153,17 +153,23 @@ def begin_without(found: Search, gone: Sequence[int], *, seed: int) -> Search:
     """
     known = found.problem.parameters
     done = _held(BaseFits(found.nominal, found.base_parts, found.base), gone)
-    lacks = lacking(done.whole.space, found.candidates)
     return begun_with(
         done,
-        with_drives(
-            done.whole, lacks, np.random.default_rng([seed, 3]), loads_of(found.candidates)
-        ),
+        _drives(done, found.candidates, seed, is_held=True),
         seed=seed,
         candidates=found.candidates,
         ruled_out=found.ruled_out,
         doubted=(*found.doubted, *(known[index].name for index in gone)),
     )
+
+
+def _drives(
+    done: BaseFits, candidates: Sequence[Candidate], seed: int, is_held: bool
+) -> Family | None:
+    """Return what the model file lacks of the drives; beside a load where links are held."""
+    lacks = lacking(done.whole.space, candidates)
+    loads = loads_of(candidates) if is_held else ()
+    return with_drives(done.whole, lacks, np.random.default_rng([seed, 3]), loads)
 
 
 def _held(done: BaseFits, gone: Sequence[int]) -> BaseFits:

@@ -114,7 +114,8 @@ def one_for_many(found: Search, train: tuple[int, ...], test: tuple[int, ...]) -
         taken = {one.candidate for one in found.accepted}
         numbers = sum(one.numbers for one in many)
         for other in found.tried.values():
-            is_fewer = other.candidate not in taken and other.numbers <= numbers
+            is_other = other.candidate.effect.name != name and other.candidate not in taken
+            is_fewer = is_other and other.numbers <= numbers
             if not is_fewer or other.is_event or not other.gain.is_sure:
                 continue
             fit = _instead(found, {one.candidate for one in many}, other, train)

@@ -28,8 +28,10 @@ def test_friction_dampers_and_rotors_of_every_joint_are_named(tmp_path: Path):
 
 @pytest.mark.slow
 def test_what_the_tool_carries_is_named_beside_them(tmp_path: Path):
-    verdict = identify(problem_of_geared(tmp_path, load=1.5).dataset).verdict
+    dataset, steps = problem_of_geared(tmp_path, load=1.5).dataset, tmp_path / "steps"
+    verdict = identify(dataset, resume_folder=steps).verdict
     assert verdict.verdict == "named", verdict.sentence
     assert _sizes(verdict, "coulomb_friction") == pytest.approx(FRICTION, rel=0.02)
     assert _sizes(verdict, "payload") == pytest.approx({"": 1.5}, rel=0.02)
     assert len(verdict.causes) == len(JOINTS) + 1, verdict.sentence
+    assert identify(dataset, resume_folder=steps).verdict.causes == verdict.causes
