@@ -31,17 +31,19 @@ class About(NamedTuple):
 
     factor: float
     """Times as long, or as short, as it may be."""
+    least: float
+    """The same, where turns come too often to look so far."""
     phases: int
     """Of a turn, that are tried first."""
     closer: int
     """Times that steps are halved once all of the recordings are looked at."""
 
 
-WIDE = About(1.6, 8, 2)
+WIDE = About(1.6, 1.6, 8, 2)
 """Where only the screen has seen it."""
-LIKELY = About(1.25, 8, 2)
+LIKELY = About(1.6, 1.25, 8, 2)
 """Where it makes the delay that fits best: half of it, and what the base makes up for."""
-NEAR = About(1.005, 32, 5)
+NEAR = About(1.005, 1.005, 32, 5)
 """Where the base was fitted with it. Which command a turn takes jumps, so of a hundred turns the
 one that is nearest to a command must be right to a hundredth of their interval."""
 _ABOUT = NEAR._replace(closer=1)
@@ -134,10 +136,12 @@ def _sought(
     last = max(part.begin + float(part.joints_at[-1]) for part in parts.values())
     reach = max(_FIRST, *(float(part.joints_at[-1]) for part in parts.values()))
     step = expected**2 / (_FINE * reach)
-    low, high = expected / about.factor, expected * about.factor
-    count = max(int(np.ceil((high - low) / max(step, 1e-9))), _FEWEST)
-    if count > _MOST:
+    room = _MOST * step / expected  # of high - low, of which either is as many times off
+    factor = min(about.factor, 0.5 * (room + np.hypot(room, 2.0)))
+    if factor < about.least:
         return None
+    low, high = expected / factor, expected * factor
+    count = max(int(np.ceil((high - low) / max(step, 1e-9))), _FEWEST)
     cost = _Cost(space, segments, base)
     wider = 1.0 / about.phases
     tries: list[tuple[float, float]] = [

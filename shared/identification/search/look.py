@@ -73,31 +73,35 @@ def look(
             if each.candidate not in known and each.candidate.recording is None
         ]
         picked += [(each, far) for each in new[:_MORE]]
+    tried = {each.candidate for each, _ in picked}
+    others = [each for each in screened if each.candidate not in tried]
     found: list[Rough] = []
-    for index, (each, begun) in enumerate(picked):
+    for index, (each, begun) in enumerate(sorted(picked, key=lambda entry: _has_turns(entry[0]))):
         progress("refit", index / len(picked), each.candidate.label)
-        found.append(refit(fit, nominal, each, segments, begun))
+        late = _late(found, each, fit, segments)
+        found.append(late or refit(fit, nominal, each, segments, begun))
+    late = (_late(found, each, fit, segments) for each in others)
+    found += [each for each in late if each is not None]
     found.sort(key=lambda entry: entry.ratio)
-    return screened, _of_turns(found, screened, fit, segments)
+    return screened, found
 
 
-def _of_turns(
-    found: list[Rough], screened: Sequence[Screened], fit: Fit, segments: tuple[int, ...]
-) -> list[Rough]:
-    """Return refits, best first, with that of an interval if a delay like its mean is the best."""
-    if not found:
-        return found
-    best = found[0].screened.candidate
-    for each in screened:
-        name = each.candidate.effect.name
-        if LATE.get(name) != best.effect.name or each.candidate.place != best.place:
-            continue
-        late = refit_late(found[0], each, fit, segments)
-        before = [one for one in found if one.screened.candidate == each.candidate]
-        others = [one for one in found if one.screened.candidate != each.candidate]
-        better = min([late, *before], key=lambda one: one.ratio)
-        return sorted([*others, better], key=lambda one: one.ratio)
-    return found
+def _has_turns(screened: Screened) -> bool:
+    """Return whether a candidate hardly differs from another one while it is small."""
+    return screened.candidate.effect.name in LATE
+
+
+def _late(
+    found: Sequence[Rough], screened: Screened, fit: Fit, segments: tuple[int, ...]
+) -> Rough | None:
+    """Return an interval's refit from a delay like its mean, None unless that is the best."""
+    if not found or not _has_turns(screened):
+        return None
+    best = min(found, key=lambda entry: entry.ratio)
+    like, own = best.screened.candidate, screened.candidate
+    if (like.effect.name, like.place) != (LATE[own.effect.name], own.place):
+        return None
+    return refit_late(best, screened, fit, segments)
 
 
 def _slight(fit: Fit) -> float:
