@@ -32,13 +32,22 @@ _SPREAD, _ABOUT = np.array([0.6, 0.5, 0.7]), np.array([0.0, 0.2, -0.8])
 """(rad)."""
 
 
-def problem_of_geared(folder: Path, load: float = 0.0, is_bare: bool = False) -> Problem:
+SENSED = 0.1
+"""Of that friction, what sensors beyond the gears see; and none of rotors and dampers."""
+_OFF = 0.08
+"""Of a joint's torque, what such a sensor is off by, in slow waves."""
+
+
+def problem_of_geared(
+    folder: Path, load: float = 0.0, is_bare: bool = False, is_sensed: bool = False
+) -> Problem:
     """Return recordings of 4 s, read to 0.02 mrad, none repeated.
 
     Args:
         folder: for the model file.
         load: at the tool, that the file does not have (kg).
         is_bare: whether the file has neither armature nor damping, either.
+        is_sensed: whether torques are those of sensors beyond the gears, not of motors.
     """
     path = write_arm(folder, "torque")
     text = re.sub(r'frictionloss="[^"]*"', "", path.read_text())
@@ -46,7 +55,9 @@ def problem_of_geared(folder: Path, load: float = 0.0, is_bare: bool = False) ->
         text = re.sub(r'(damping|armature)="[^"]*"', "", text)
     path.write_text(text)
     plant = mjcf(path, "torque", JOINTS, JOINTS, "tool")
-    recordings = tuple(_recording(plant, load, name, rates) for name, rates in _RATES.items())
+    recordings = tuple(
+        _recording(plant, load, name, rates, is_sensed) for name, rates in _RATES.items()
+    )
     dataset = Dataset(
         folder, ModelSource("mjcf", path), "torque", JOINTS, JOINTS, recordings, (), ""
     )
@@ -62,7 +73,9 @@ def candidates(problem: Problem, *names: str) -> tuple[Candidate, ...]:
     return candidates_of(chosen, problem.subject, frozenset())[0]
 
 
-def _recording(plant: Plant, load: float, name: str, rates: tuple[float, ...]) -> Trajectory:
+def _recording(
+    plant: Plant, load: float, name: str, rates: tuple[float, ...], is_sensed: bool
+) -> Trajectory:
     """Return a motion and the torques that it takes of the arm as it is."""
     at: Float64 = np.arange(0.0, 4.0, 0.005)
     phase = at[:, None] * np.array(rates) + np.array([0.3, 1.2, 2.0])
@@ -72,13 +85,17 @@ def _recording(plant: Plant, load: float, name: str, rates: tuple[float, ...]) -
     model = Rollouts(plant, (), 1).model
     for joint in JOINTS:
         dof = int(model.joint(plant.mj_joint(joint)).dofadr[0])
-        model.dof_frictionloss[dof] = FRICTION[joint]
-        model.dof_armature[dof], model.dof_damping[dof] = ROTOR[joint], DAMPING[joint]
+        model.dof_frictionloss[dof] = FRICTION[joint] * (SENSED if is_sensed else 1.0)
+        model.dof_armature[dof] = 0.0 if is_sensed else ROTOR[joint]
+        model.dof_damping[dof] = 0.0 if is_sensed else DAMPING[joint]
     tool = int(model.body(plant.tool_body).id)
     grown = 1.0 + load / model.body_mass[tool]
     model.body_mass[tool] *= grown
     model.body_inertia[tool] *= grown
     torque = inverse_dynamics(plant, model, q, qd, qdd)
+    if is_sensed:
+        wave = np.sin(at[:, None] * np.array([5.3, 6.1, 7.7]) + rates[0])
+        torque = torque + _OFF * torque.std(axis=0) * wave
     read = 2e-5 * np.round(q / 2e-5)
     split: Split = "test" if name == "away" else "train"
     return Trajectory(name, split, "", q[0], qd[0], at, torque, at, read)

@@ -1,7 +1,7 @@
 """Data sets of recordings made elsewhere: what their converters share."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +50,11 @@ def write(
         joints=joints, actuators=joints, trajectories=trajectories, caveats=(), hash="",
     )  # fmt: skip
     write_dataset(dataset, folder, notes, {"model.xml": model.encode()})
+
+
+def motors(joints: Sequence[str]) -> str:
+    """Return an MJCF's motor for each joint, of that name."""
+    return "".join(f'\n    <motor name="{joint}" joint="{joint}"/>' for joint in joints)
 
 
 def hashes_of(raw: Mapping[str, Path]) -> dict[str, str]:

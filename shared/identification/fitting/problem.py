@@ -1,6 +1,7 @@
 """Variants of the model against the recordings: residuals in units of the noise floor."""
 
 import copy
+import functools
 import math
 from collections import defaultdict
 from collections.abc import Sequence
@@ -15,6 +16,7 @@ from shared.identification.dataset.types import Dataset, Float64
 from shared.identification.effect import Candidate
 from shared.identification.fitting.parameters import BaseParameter, enter_base
 from shared.identification.noise.floor import Noise
+from shared.sim.plant.inverse import model_of, reluctance
 from shared.sim.plant.rollouts import Entry, Reports, Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import pose_error, smoothed
@@ -22,6 +24,10 @@ from shared.sim.plant.structure import Structure
 
 BLOCK = 0.02
 """Residuals are averaged over this long: what a 50 Hz look at the arm would see (s)."""
+_POSTURES = 8
+"""Of all recordings together, at which it is asked how hard the arm is to move."""
+_SHORT = 0.15
+"""For which a torque moves it then: half of a part (s)."""
 DIVERGED = 1e3
 """Residual of an arm whose physics diverged, in noise floors."""
 
@@ -146,10 +152,12 @@ class Problem:
         """
         return [
             [
-                self.noise.news(self.floors(report, segment))
+                self.noise.news(weight * self.floors(report, segment))
                 for report, segment in zip(reports, segments, strict=True)
             ]
-            for reports in self.reports(variants, segments)
+            for weight, reports in zip(
+                map(self._weight, variants), self.reports(variants, segments), strict=True
+            )
         ]
 
     def shape_of(self, segment: int) -> tuple[int, int]:
@@ -177,7 +185,43 @@ class Problem:
         What is slow counts for as much there as what is fast.
         """
         (reports,) = self.reports([variant], segments)
-        return [self.floors(each, segment) for each, segment in zip(reports, segments, strict=True)]
+        weight = self._weight(variant)
+        return [
+            weight * self.floors(each, segment)
+            for each, segment in zip(reports, segments, strict=True)
+        ]
+
+    def _weight(self, variant: Variant) -> Float64:
+        """Return float64[C], how hard a variant is to move, in times what the nominal arm is.
+
+        What an arm goes astray by is the torque that the model lacks, over how hard it is to move.
+        Without that, the heavier an arm the better it fits: one that nothing moves goes on as it
+        began. Ones where noise is no torque.
+        """
+        channels = len(self.noise.joints)
+        out = np.ones(channels if self.noise.tracker is None else channels + 6)
+        if self.noise.is_torque:
+            out[:channels] = self._reluctance(variant) / self._nominal_reluctance
+        return out
+
+    @functools.cached_property
+    def _nominal_reluctance(self) -> Float64:
+        return self._reluctance(Variant(np.zeros(len(self.parameters))))
+
+    def _reluctance(self, variant: Variant) -> Float64:
+        """Return float64[J], how hard joints are to move, at some postures of the recordings.
+
+        Without what an effect compiles into the arm.
+        """
+        subject = self.subject
+        extras = tuple(
+            each for each in variant.extras if not each[0].effect.structure(subject, each[0].place)
+        )
+        entry = self.entry(Variant(variant.x, extras))
+        row = subject.nominal.entered(entry, self.segments[0].recorded)
+        q = np.concatenate([each.q for each in self.dataset.trajectories])
+        some = q[:: max(len(q) // _POSTURES, 1)]
+        return reluctance(subject.plant, model_of(row), some, _SHORT).mean(axis=0)
 
     def vector(self, variants: Sequence[Variant], segments: Sequence[int]) -> Float64:
         """Return float64[V, M]: the residuals of each variant in one row."""

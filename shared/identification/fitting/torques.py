@@ -55,7 +55,7 @@ def by_torques(space: Space) -> Float64:
         return np.r_[(np.concatenate(missing) / exact).ravel(), u / priors]
 
     low, high = space.bounds
-    low = np.where(free, np.expm1(np.maximum(low, -LOOSE)), low)  # of what is 0 nothing is learnt
+    low = np.where(free, np.expm1(low), low)
     high = np.where(free, np.expm1(high), high)
     u = np.zeros(space.size)
     for _ in range(_STEPS):

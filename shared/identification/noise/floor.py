@@ -58,6 +58,14 @@ class Noise:
     memory: Memory | Drift | None = None
     """How much of it is carried on from block to block, or how it grows where nothing holds the
     arm; None where no repeat says so, and nothing else does."""
+    is_torque: bool = False
+    """Whether it is torques that the model lacks, not readings: a residual counts by what torque
+    it takes, so by how hard the arm is to move."""
+
+    @property
+    def is_white(self) -> bool:
+        """Return whether what is new in each block is known to be noise, as repeats say."""
+        return self.is_measured and self.memory is not None
 
     def floors(self, residuals: Float64, whiten: Float64 | None) -> Float64:
         """Return residuals of joints in noise floors.

@@ -20,6 +20,7 @@ from shared.identification.fitting.space import Space
 from shared.identification.fitting.torques import by_torques
 from shared.identification.gate.certainty import is_there
 from shared.identification.gate.held_out import compare, stretches
+from shared.identification.noise.drift import drift_of
 from shared.identification.noise.floor import Noise
 from shared.identification.search.family import Family, left_without
 from shared.identification.search.screen import Screened
@@ -58,6 +59,25 @@ def no_more(noise: Noise, space: Space) -> Noise:
     """
     at_most = _AT_MOST * floor_at(space, by_torques(space)).joints
     return replace(noise, joints=np.minimum(noise.joints, at_most))
+
+
+def astray(space: Space) -> Noise:
+    """Return noise as of an arm that is pushed at random by torques, as far as drives leave it.
+
+    Sensors beyond the gears see an arm so light that a torque that is off by a hundredth leads it
+    far astray: the heavier the better it fits then, and the end of a part outweighs all before.
+    Here a residual counts by the torque that it takes, and only what is new in each block.
+
+    Args:
+        space: with drives, and a noise that repeats have not measured.
+    """
+    problem = space.problem
+    problem = replace(problem, noise=replace(problem.noise, is_torque=True))
+    left = problem.plain(space.variant(by_torques(space)), problem.of("train"))
+    drift = drift_of(left, 1.0, np.zeros(left[0].shape[1]))
+    if drift is None:
+        return problem.noise
+    return problem.noise.growing(drift, max(len(each) for each in left))
 
 
 def loads_of(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:

@@ -1,7 +1,7 @@
 """Begins a search: what the noise is, and the base fitted without any cause."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,13 +18,20 @@ from shared.identification.fitting.fit import (
     fit_without,
     floor_from_base,
 )
-from shared.identification.fitting.parameters import base_parameters, bends
+from shared.identification.fitting.parameters import BaseParameter, base_parameters, bends
 from shared.identification.fitting.problem import BLOCK, Problem
 from shared.identification.fitting.space import Space
 from shared.identification.gate.held_out import stretches
 from shared.identification.noise.floor import noise_of
 from shared.identification.progress import Progress
-from shared.identification.search.bare import lacking, loads_of, no_more, screened_of, with_drives
+from shared.identification.search.bare import (
+    astray,
+    lacking,
+    loads_of,
+    no_more,
+    screened_of,
+    with_drives,
+)
 from shared.identification.search.family import Family
 from shared.identification.search.screen import candidates_of
 from shared.identification.search.searched import Search, join
@@ -74,22 +81,15 @@ def begin(
         known = tuple(each for each in (*known, *creep) if each.name in fits.names)
     problem = Problem(subject, dataset, known, noise)
     progress("base fit", 0.0, f"{len(known)} parameters" + ("" if fits is None else ", kept"))
-    space = Space(problem)
-    done = with_creep(fit_base(space, rng), creep) if fits is None else fit_again(space, fits)
+    step = _Step(released, creep, candidates, seed, progress, fits)
+    done, family = step.from_base(problem, rng)
+    lacks = lacking(Space(problem), candidates)
+    if family is None and lacks and not noise.is_measured:
+        progress("base fit", 0.5, "as an arm that torques push which nobody knows")
+        pushed = astray(Space(problem, lacks))
+        other = step.from_base(replace(problem, noise=pushed), rng)
+        done, family = (done, family) if other[1] is None else other
     problem = done.whole.space.problem
-    if lacking(done.whole.space, candidates):
-        progress("base fit", 0.5, "with friction and rotors of all joints that the file lacks")
-    is_held = any(each not in problem.parameters for each in released)
-    family = _drives(done, candidates, seed, is_held)
-    best = done.whole if family is None else family.fit
-    if fits is None and (doubted := doubted_of(best)):
-        # What is known of a link does not hold, so the base may not bend it: what is wrong there
-        # is looked for like any other cause.
-        bent = ", ".join(problem.parameters[index].name for index in doubted)
-        progress("base fit", 0.5, f"without {bent}")
-        done = _held(done, doubted)
-        problem = done.whole.space.problem
-        family = _drives(done, candidates, seed, is_held=True)
     return begun_with(
         done,
         family,
@@ -98,6 +98,43 @@ def begin(
         ruled_out=ruled_out,
         doubted=tuple(each.name for each in released if each not in problem.parameters),
     )
+
+
+@dataclass(frozen=True)
+class _Step:
+    """What it takes to fit a base, and what the model file lacks of drives."""
+
+    released: tuple[BaseParameter, ...]
+    creep: tuple[BaseParameter, ...]
+    candidates: tuple[Candidate, ...]
+    seed: int
+    progress: Progress
+    fits: SavedFits | None
+
+    def from_base(
+        self, problem: Problem, rng: np.random.Generator
+    ) -> tuple[BaseFits, Family | None]:
+        """Return the fits; parameters that they bend beyond belief are not released."""
+        space, fits = Space(problem), self.fits
+        done = (
+            with_creep(fit_base(space, rng), self.creep) if fits is None else fit_again(space, fits)
+        )
+        problem = done.whole.space.problem
+        if lacking(done.whole.space, self.candidates):
+            self.progress(
+                "base fit", 0.5, "with friction and rotors of all joints that the file lacks"
+            )
+        is_held = any(each not in problem.parameters for each in self.released)
+        family = _drives(done, self.candidates, self.seed, is_held)
+        best = done.whole if family is None else family.fit
+        if fits is None and (doubted := doubted_of(best)):
+            # What is known of a link does not hold, so the base may not bend it: what is wrong
+            # there is looked for like any other cause.
+            bent = ", ".join(problem.parameters[index].name for index in doubted)
+            self.progress("base fit", 0.5, f"without {bent}")
+            done = _held(done, doubted)
+            family = _drives(done, self.candidates, self.seed, is_held=True)
+        return done, family
 
 
 def begun_with(

@@ -106,7 +106,7 @@ def _late(
 
 def _slight(fit: Fit) -> float:
     """Return which share of the training residual is too little to be looked at."""
-    is_white = fit.space.problem.noise.memory is not None
+    is_white = fit.space.problem.noise.is_white
     return min(_SLIGHT, _SURELY / len(fit.residual)) if is_white else _SLIGHT
 
 

@@ -28,7 +28,7 @@ def hopeless(found: Search) -> Callable[[Screened], bool]:
     Args:
         found: the search so far.
     """
-    if found.problem.noise.memory is None or not found.parts.is_near_noise:
+    if not found.problem.noise.is_white or not found.parts.is_near_noise:
         return lambda one: False
     return lambda one: _is_hopeless(found, one)
 

@@ -340,7 +340,7 @@ def held_of(found: Search, before: Fit) -> Held:
 
 def _is_fitted(before: Fit, after: Fit) -> bool:
     """Return whether what was fitted to speaks for a cause so plainly that the rest is asked."""
-    if before.space.problem.noise.memory is None:
+    if not before.space.problem.noise.is_white:
         return False
     numbers = after.space.size - before.space.size
     return 2.0 * (before.cost - after.cost) > _PLAINLY + _PLAINLY_EACH * numbers

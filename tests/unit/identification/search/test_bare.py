@@ -9,7 +9,15 @@ import pytest
 from shared.identification.fitting.fit import Fit
 from shared.identification.fitting.problem import Problem
 from shared.identification.fitting.space import Space
-from shared.identification.search.bare import lacking, loads_of, no_more, screened_of, with_drives
+from shared.identification.fitting.torques import by_torques
+from shared.identification.search.bare import (
+    astray,
+    lacking,
+    loads_of,
+    no_more,
+    screened_of,
+    with_drives,
+)
 from tests.arms import JOINTS, make_plant, make_subject
 from tests.geared import FRICTION, candidates, problem_of_geared
 
@@ -68,3 +76,23 @@ def test_nothing_is_lacking_where_the_file_has_it_or_a_servo_holds_the_arm(tmp_p
     servo = replace(problem, subject=make_subject(make_plant(tmp_path)))
     assert lacking(Space(servo), candidates(problem, *DRIVES)) == ()
     assert with_drives(_base(problem), (), np.random.default_rng(0)) is None
+
+
+def test_where_torques_push_an_arm_that_nobody_knows_a_heavier_one_is_further_off(tmp_path: Path):
+    problem = problem_of_geared(tmp_path, is_sensed=True)
+    space = Space(problem, candidates(problem, "coulomb_friction"))
+    light = by_torques(space)
+    heavy = light.copy()
+    for index, parameter in enumerate(problem.parameters):
+        if parameter.name.startswith("armature"):
+            heavy[index] = np.log(0.3 / parameter.nominal)  # where an arm goes on as it began
+    noise = astray(space)
+    pushed = Space(replace(problem, noise=noise), space.candidates)
+    train = problem.of("train")
+
+    def left(space: Space, z: np.ndarray) -> float:
+        return float(np.mean(space.problem.vector([space.variant(z)], train) ** 2))
+
+    assert noise.is_torque
+    worse = left(space, heavy) / left(space, light)
+    assert left(pushed, heavy) / left(pushed, light) > 3.0 * worse
