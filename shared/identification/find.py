@@ -22,6 +22,7 @@ from shared.identification.fitting.whole import fit_to_all
 from shared.identification.leftover.located import leftovers
 from shared.identification.progress import Progress, silent
 from shared.identification.search.again import fresh, leave_out
+from shared.identification.search.bare import counted_by_torque
 from shared.identification.search.begin import begin, begin_without, doubted_of
 from shared.identification.search.bent import far_from_file, is_worse, otherwise, worse_than_file
 from shared.identification.search.once import is_named, take_back_pushes, take_pushes
@@ -153,6 +154,8 @@ def _may_be_its_step(found: Search) -> bool:
 
 def _pushed_once(found: Search, left: tuple[Unexplained, ...]) -> tuple[Unexplained, ...]:
     """Name what pushed once, if no law is missing; return what is left after that."""
+    if found.problem.noise.is_torque:
+        return left  # all that is left is taken for torques that nobody knows
     if take_back_pushes(found, left):
         left = _left(found, [each for each in left if each.is_external])
     if is_open(found) or not take_pushes(found, left):
@@ -202,6 +205,7 @@ def _verdict(
                     far_from_file(found.current),
                     _shorter_step(found, dataset),
                     coarse_step(found.base),
+                    counted_by_torque(found.problem.noise),
                 ],
             ),
             *in_words(dataset.caveats),

@@ -80,6 +80,16 @@ def astray(space: Space) -> Noise:
     return problem.noise.growing(drift, max(len(each) for each in left))
 
 
+def counted_by_torque(noise: Noise) -> str:
+    """Return in words that residuals count as :func:`astray` says; empty where they do not."""
+    if not noise.is_torque:
+        return ""
+    return (
+        "the arm is so light, as its torques were measured, that it goes astray in a moment: how "
+        "far off a model is was judged by the torque that is missing, while pictures show angles"
+    )
+
+
 def loads_of(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     """Return what the tool may carry, fewest numbers first."""
     return tuple(each for each in candidates if each.effect.name == _CARRIED)

@@ -72,6 +72,7 @@ def test_a_run_ends_with_a_report_and_leaves_no_process(tmp_path: Path) -> None:
     assert summary["repeated_rollouts"] == 0
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_is_resumed_though_its_newest_checkpoint_is_damaged(
     tmp_path: Path,
 ) -> None:

@@ -12,6 +12,7 @@ from shared.identification.fitting.space import Space
 from shared.identification.fitting.torques import by_torques
 from shared.identification.search.bare import (
     astray,
+    counted_by_torque,
     lacking,
     loads_of,
     no_more,
@@ -94,5 +95,7 @@ def test_where_torques_push_an_arm_that_nobody_knows_a_heavier_one_is_further_of
         return float(np.mean(space.problem.vector([space.variant(z)], train) ** 2))
 
     assert noise.is_torque
+    assert "torque" in counted_by_torque(noise)
+    assert counted_by_torque(problem.noise) == ""
     worse = left(space, heavy) / left(space, light)
     assert left(pushed, heavy) / left(pushed, light) > 3.0 * worse
