@@ -224,6 +224,8 @@ class SavedFits:
     parts: tuple[float, ...]
     whole: tuple[float, ...]
     starts_agree: bool
+    is_torque: bool = False
+    """Whether noise was torques, see :class:`Noise`."""
 
 
 def fit_again(space: Space, saved: SavedFits) -> BaseFits:

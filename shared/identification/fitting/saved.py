@@ -10,7 +10,7 @@ from shared.identification.search.searched import Search
 from shared.runtime.files import atomic_write
 
 FILE = "base_fit.json"
-SCHEMA = 2
+SCHEMA = 3
 
 
 class _Saved(msgspec.Struct, frozen=True, kw_only=True):
@@ -23,6 +23,7 @@ class _Saved(msgspec.Struct, frozen=True, kw_only=True):
     parts: list[float]
     whole: list[float]
     starts_agree: bool
+    is_torque: bool
 
 
 def save(folder: Path, dataset: Dataset, seed: int, found: Search) -> None:
@@ -36,6 +37,7 @@ def save(folder: Path, dataset: Dataset, seed: int, found: Search) -> None:
         parts=found.base_parts.z.tolist(),
         whole=found.base.z.tolist(),
         starts_agree=found.base.starts_agree,
+        is_torque=found.problem.noise.is_torque,
     )
     atomic_write(folder / FILE, msgspec.json.encode(kept))
 
@@ -52,5 +54,9 @@ def load(folder: Path, dataset: Dataset, seed: int) -> SavedFits | None:
     if not len(kept.parts) == len(kept.whole) == len(kept.parameters):
         return None
     return SavedFits(
-        tuple(kept.parameters), tuple(kept.parts), tuple(kept.whole), kept.starts_agree
+        tuple(kept.parameters),
+        tuple(kept.parts),
+        tuple(kept.whole),
+        kept.starts_agree,
+        kept.is_torque,
     )

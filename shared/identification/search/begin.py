@@ -82,13 +82,16 @@ def begin(
     problem = Problem(subject, dataset, known, noise)
     progress("base fit", 0.0, f"{len(known)} parameters" + ("" if fits is None else ", kept"))
     step = _Step(released, creep, candidates, seed, progress, fits)
-    done, family = step.from_base(problem, rng)
-    lacks = lacking(Space(problem), candidates)
-    if family is None and lacks and not noise.is_measured:
+    is_pushed = fits is not None and fits.is_torque
+    done, family = (None, None) if is_pushed else step.from_base(problem, rng)
+    full = Space(Problem(subject, dataset, released, noise))
+    lacks = lacking(full, candidates)
+    is_new = fits is None and family is None and lacks and not noise.is_measured
+    if done is None or is_new:
         progress("base fit", 0.5, "as an arm that torques push which nobody knows")
-        pushed = astray(Space(problem, lacks))
-        other = step.from_base(replace(problem, noise=pushed), rng)
-        done, family = (done, family) if other[1] is None else other
+        pushed = replace(problem, noise=astray(Space(full.problem, lacks)))
+        other, found = step.from_base(pushed, rng)
+        done, family = (done, family) if done and found is None else (other, found)
     problem = done.whole.space.problem
     return begun_with(
         done,

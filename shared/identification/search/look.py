@@ -80,8 +80,7 @@ def look(
         progress("refit", index / len(picked), each.candidate.label)
         late = _late(found, each, fit, segments)
         found.append(late or refit(fit, nominal, each, segments, begun))
-    late = (_late(found, each, fit, segments) for each in others)
-    found += [each for each in late if each is not None]
+    found += [late for each in others if (late := _late(found, each, fit, segments))]
     found.sort(key=lambda entry: entry.ratio)
     return screened, found
 
