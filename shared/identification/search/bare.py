@@ -74,8 +74,7 @@ def astray(space: Space) -> Noise:
     problem = space.problem
     problem = replace(problem, noise=replace(problem.noise, is_torque=True))
     left = problem.plain(space.variant(by_torques(space)), problem.of("train"))
-    exact: Float64 = np.zeros(left[0].shape[1])
-    drift = drift_of(left, 1.0, exact)
+    drift = drift_of(left, 1.0, np.zeros_like(problem.noise.correlation))
     if drift is None:
         return problem.noise
     return problem.noise.growing(drift, max(len(each) for each in left))
