@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from shared.identification.dataset.types import Float64, Split, Trajectory
-from studies.real_data.folders import hashes_of, motors, recording, there, write
+from studies.real_data.folders import arm_of_motors, hashes_of, recording, there, write
 
 JOINTS = ("shoulder", "elbow")
 PARAMETERS = "params_C.1_model_1.0.yml"
@@ -76,15 +76,8 @@ def _model(of: dict[str, float]) -> str:
             zip(JOINTS, links, strict=True)
         )
     )
-    return f"""<mujoco model="double_pendulum">
-  <option timestep="0.002" gravity="0 0 {-of["g"]}"/>
-  <worldbody>{bodies}
-    </body></body>
-  </worldbody>
-  <actuator>{motors(JOINTS)}
-  </actuator>
-</mujoco>
-"""
+    closed = f"{bodies}\n    </body></body>"
+    return arm_of_motors("double_pendulum", JOINTS, closed, of["g"])
 
 
 if __name__ == "__main__":

@@ -52,9 +52,25 @@ def write(
     write_dataset(dataset, folder, notes, {"model.xml": model.encode()})
 
 
-def motors(joints: Sequence[str]) -> str:
-    """Return an MJCF's motor for each joint, of that name."""
-    return "".join(f'\n    <motor name="{joint}" joint="{joint}"/>' for joint in joints)
+def arm_of_motors(name: str, joints: Sequence[str], bodies: str, gravity: float = 9.81) -> str:
+    """Return the MJCF of an arm with a motor, of its joint's name, at each joint.
+
+    Args:
+        name: of the model.
+        joints: of the motors.
+        bodies: MJCF; angles are in rad.
+        gravity: downwards (m/s^2).
+    """
+    motors = "".join(f'\n    <motor name="{joint}" joint="{joint}"/>' for joint in joints)
+    return f"""<mujoco model="{name}">
+  <compiler angle="radian"/>
+  <option timestep="0.002" gravity="0 0 {-gravity}"/>
+  <worldbody>{bodies}
+  </worldbody>
+  <actuator>{motors}
+  </actuator>
+</mujoco>
+"""
 
 
 def hashes_of(raw: Mapping[str, Path]) -> dict[str, str]:

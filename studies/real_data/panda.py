@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from shared.identification.dataset.types import Float64, Trajectory
-from studies.real_data.folders import hashes_of, motors, recording, there, write
+from studies.real_data.folders import arm_of_motors, hashes_of, recording, there, write
 
 JOINTS = tuple(f"joint{number}" for number in range(1, 8))
 FILES = {name: f"exciting_traj_{name}.txt" for name in ("time", "positions", "torques")}
@@ -74,16 +74,7 @@ def _model() -> str:
       <geom type="sphere" size="0.05" contype="0" conaffinity="0"/>"""
         for joint, (at, turned, mass, centre, inertia) in zip(JOINTS, links, strict=True)
     )
-    return f"""<mujoco model="panda">
-  <compiler angle="radian"/>
-  <option timestep="0.002"/>
-  <worldbody>{bodies}
-    {"</body>" * 7}
-  </worldbody>
-  <actuator>{motors(JOINTS)}
-  </actuator>
-</mujoco>
-"""
+    return arm_of_motors("panda", JOINTS, bodies + "\n    " + "</body>" * len(JOINTS))
 
 
 if __name__ == "__main__":

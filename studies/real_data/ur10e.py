@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from shared.identification.dataset.types import Float64, Split, Trajectory
-from studies.real_data.folders import hashes_of, motors, recording, there, write
+from studies.real_data.folders import arm_of_motors, hashes_of, recording, there, write
 
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 GAINS = np.array([14.87, 13.26, 11.13, 10.62, 11.03, 11.47])
@@ -80,17 +80,8 @@ def _model(damping: float) -> str:
             JOINTS, (line.split(";") for line in _LINKS.split("\n") if line), strict=True
         )
     )
-    return f"""<mujoco model="ur10e">
-  <compiler angle="radian"/>
-  <option timestep="0.002"/>
-  <worldbody>
-    <body quat="1 0 0 1">{bodies}
-    {"</body>" * 7}
-  </worldbody>
-  <actuator>{motors(JOINTS)}
-  </actuator>
-</mujoco>
-"""
+    base = f'\n    <body quat="1 0 0 1">{bodies}\n    {"</body>" * (1 + len(JOINTS))}'
+    return arm_of_motors("ur10e", JOINTS, base)
 
 
 if __name__ == "__main__":

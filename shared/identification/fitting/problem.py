@@ -152,7 +152,7 @@ class Problem:
         """
         return [
             [
-                self.noise.news(weight * self.floors(report, segment))
+                self.noise.news(self.floors(report, segment, weight))
                 for report, segment in zip(reports, segments, strict=True)
             ]
             for weight, reports in zip(
@@ -187,22 +187,20 @@ class Problem:
         (reports,) = self.reports([variant], segments)
         weight = self._weight(variant)
         return [
-            weight * self.floors(each, segment)
+            self.floors(each, segment, weight)
             for each, segment in zip(reports, segments, strict=True)
         ]
 
     def _weight(self, variant: Variant) -> Float64:
-        """Return float64[C], how hard a variant is to move, in times what the nominal arm is.
+        """Return float64[J], how hard a variant is to move, in times what the nominal arm is.
 
         What an arm goes astray by is the torque that the model lacks, over how hard it is to move.
         Without that, the heavier an arm the better it fits: one that nothing moves goes on as it
         began. Ones where noise is no torque.
         """
-        channels = len(self.noise.joints)
-        out = np.ones(channels if self.noise.tracker is None else channels + 6)
-        if self.noise.is_torque:
-            out[:channels] = self._reluctance(variant) / self._nominal_reluctance
-        return out
+        if not self.noise.is_torque:
+            return np.ones(len(self.noise.joints))
+        return self._reluctance(variant) / self._nominal_reluctance
 
     @functools.cached_property
     def _nominal_reluctance(self) -> Float64:
@@ -219,9 +217,12 @@ class Problem:
         )
         entry = self.entry(Variant(variant.x, extras))
         row = subject.nominal.entered(entry, self.segments[0].recorded)
+        return reluctance(subject.plant, model_of(row), self._postures, _SHORT).mean(axis=0)
+
+    @functools.cached_property
+    def _postures(self) -> Float64:
         q = np.concatenate([each.q for each in self.dataset.trajectories])
-        some = q[:: max(len(q) // _POSTURES, 1)]
-        return reluctance(subject.plant, model_of(row), some, _SHORT).mean(axis=0)
+        return q[:: max(len(q) // _POSTURES, 1)]
 
     def vector(self, variants: Sequence[Variant], segments: Sequence[int]) -> Float64:
         """Return float64[V, M]: the residuals of each variant in one row."""
@@ -244,11 +245,19 @@ class Problem:
         """Return block means of a segment's joint residuals, float64[B, J], in noise floors."""
         return self.noise.floors(joints, self._whitening[segment])
 
-    def floors(self, reports: Reports, segment: int) -> Float64:
-        """Return float64[B, C]: block means of a segment's residuals in noise floors."""
+    def floors(self, reports: Reports, segment: int, weight: Float64 | None = None) -> Float64:
+        """Return float64[B, C]: block means of a segment's residuals in noise floors.
+
+        Args:
+            reports: what a variant would have logged.
+            segment: of which part.
+            weight: float64[J], what residuals of the joints are multiplied by.
+        """
         joints, tracker = self.raw(reports, segment)
         of_joints, of_tracker = self._bins[segment]
         out = self.in_floors(of_joints.mean(joints), segment)
+        if weight is not None:
+            out = weight * out
         if tracker is not None and of_tracker is not None and self.noise.tracker is not None:
             more = of_tracker.mean(tracker) / self.noise.tracker
             rows = min(len(out), len(more))

@@ -71,25 +71,25 @@ def begin(
     if fits is not None and not {each.name for each in (*known, *creep)} >= set(fits.names):
         fits = None
     candidates, ruled_out = candidates_of(catalogue, subject, without)
-    problem = Problem(subject, dataset, known, noise)
+    full = Problem(subject, dataset, released, noise)
+    lacks = lacking(Space(full), candidates)
     if not noise.is_measured:
         progress("noise floor", 0.5, "no repeats: from what the base leaves")
-        noise = floor_from_base(Space(problem))
-        if lacks := lacking(Space(problem), candidates):
-            noise = no_more(noise, Space(problem, lacks))
+        noise = floor_from_base(Space(full))
+        if lacks:
+            noise = no_more(noise, Space(full, lacks))
+        full = replace(full, noise=noise)
     if fits is not None:
         known = tuple(each for each in (*known, *creep) if each.name in fits.names)
-    problem = Problem(subject, dataset, known, noise)
+    problem = replace(full, parameters=known)
     progress("base fit", 0.0, f"{len(known)} parameters" + ("" if fits is None else ", kept"))
     step = _Step(released, creep, candidates, seed, progress, fits)
     is_pushed = fits is not None and fits.is_torque
     done, family = (None, None) if is_pushed else step.from_base(problem, rng)
-    full = Space(Problem(subject, dataset, released, noise))
-    lacks = lacking(full, candidates)
     is_new = fits is None and family is None and lacks and not noise.is_measured
     if done is None or is_new:
         progress("base fit", 0.5, "as an arm that torques push which nobody knows")
-        pushed = replace(problem, noise=astray(Space(full.problem, lacks)))
+        pushed = replace(problem, noise=astray(Space(full, lacks)))
         other, found = step.from_base(pushed, rng)
         done, family = (done, family) if done and found is None else (other, found)
     problem = done.whole.space.problem
