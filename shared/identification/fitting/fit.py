@@ -28,7 +28,9 @@ _MENDED = 6
 _NEARLY = 0.01
 """A second start that comes down to so little more than the first one has found the same."""
 _SLIGHT = 0.01
-"""A step with a mended derivative that takes off less than this share is its last one."""
+"""A step with a mended derivative that takes off less than this share is usually the last one."""
+_MANY = 10.0
+"""Times what a new derivative must take off, that a step with a mended one must."""
 _NEAR_NOISE = 1.5
 """Mean square residual, in noise floors, from which the base may be bent towards a cause."""
 AGREE = 0.02
@@ -105,14 +107,17 @@ def polish(
     z = space.clip(start)
     fit = Fit.at(space, z, segments) if known is None else Fit.of(space, z, *known)
     for _ in range(steps):
-        found = go_down(fit, segments)
+        found = go_down(fit, segments, slight=_MANY * enough)
         if not found.cost < fit.cost * (1 - enough):
             break
         fit = Fit.at(space, found.z, segments)
     return fit
 
 
-def go_down(fit: Fit, segments: tuple[int, ...], factors: tuple[float, ...] = _DAMPINGS) -> Fit:
+def go_down(
+    fit: Fit, segments: tuple[int, ...], factors: tuple[float, ...] = _DAMPINGS,
+    slight: float = _SLIGHT,
+) -> Fit:  # fmt: skip
     """Take damped steps with one derivative, mended after each (Broyden 1965).
 
     A step is tried at several dampings at once. Coordinates at a bound that want to go further
@@ -122,6 +127,7 @@ def go_down(fit: Fit, segments: tuple[int, ...], factors: tuple[float, ...] = _D
         fit: where it begins, with the derivative there.
         segments: recordings to fit to.
         factors: of the damping, tried at once.
+        slight: a step that takes off less than this share of the cost is the last one.
     """
     space, z, residual, jacobian, cost = fit.space, fit.z, fit.residual, fit.jacobian, fit.cost
     damping = 1e-1
@@ -139,7 +145,7 @@ def go_down(fit: Fit, segments: tuple[int, ...], factors: tuple[float, ...] = _D
         if costs[best] >= cost:
             damping *= 100.0
             continue
-        is_enough = costs[best] > cost * (1 - _SLIGHT)
+        is_enough = costs[best] > cost * (1 - slight)
         z, residual, cost = tries[best], found[best], float(costs[best])
         damping = max(dampings[best], 1e-4)
         if is_enough:

@@ -53,6 +53,8 @@ _FEWEST, _MOST = 5, 256
 and that is smooth."""
 _KEPT = 6
 """Best ones that are looked at more closely."""
+_SAME = 10
+"""Pairs are the same that are in the same one of so many parts of a step."""
 _AROUND = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Steps about what was kept."""
 
@@ -157,12 +159,7 @@ def _sought(
     while True:
         best: list[tuple[float, float]] = [tries[index] for index in np.argsort(costs)[:_KEPT]]
         fine = _FINE * min(reach, last) * 2.0**closer
-        tries = [
-            (interval + along * interval**2 / fine, phase + around * wider)
-            for interval, phase in best
-            for along in _AROUND
-            for around in (-1.0, 0.0, 1.0)
-        ]
+        tries = _around(best, best[0][0] ** 2 / fine, wider)
         picked = tuple(
             segment for segment in segments if -reach < parts[segment].begin - since < reach
         )
@@ -173,6 +170,26 @@ def _sought(
         closer += reach >= last
         reach *= 2.0
         wider *= 0.5
+
+
+def _around(
+    best: list[tuple[float, float]], step: float, wider: float
+) -> list[tuple[float, float]]:
+    """Return pairs about the best ones; of those that are all but the same, one.
+
+    Args:
+        best: intervals and phases, the best one first.
+        step: of intervals.
+        wider: of phases.
+    """
+    found: dict[tuple[int, int], tuple[float, float]] = {}
+    for interval, phase in best:
+        for along in _AROUND:
+            for around in (-1.0, 0.0, 1.0):
+                pair = (interval + along * step, phase + around * wider)
+                at = (round(_SAME * pair[0] / step), round(_SAME * pair[1] / wider))
+                found.setdefault(at, pair)
+    return list(found.values())
 
 
 class _Cost:

@@ -99,7 +99,7 @@ def _still_far(base: Fit, space: Space) -> Fit | None:
     train = space.problem.of("train")
     fit = _begun(_placed(base, space), train)
     for _ in range(_STEPS):
-        found = go_down(fit, train)
+        found = go_down(fit, train, slight=_ENOUGH)  # a valley bends
         if not _is_far(found):
             return None
         if not found.cost < fit.cost * (1 - _ENOUGH):

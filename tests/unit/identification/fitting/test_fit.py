@@ -2,12 +2,13 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from shared.identification.arm.subject import recorded_of, subject_of
-from shared.identification.dataset.types import Dataset, ModelSource, Trajectory
+from shared.identification.dataset.types import Dataset, Float64, ModelSource, Trajectory
 from shared.identification.fitting.cmaes import minimize
 from shared.identification.fitting.fit import (
     BaseFits,
@@ -139,3 +140,34 @@ def test_an_arm_under_torques_is_driven_by_what_was_commanded_friction_and_all(t
     effort = still + np.array([9.0, 0.0, 0.0])
     logged = replace(dataset, trajectories=(replace(made, effort=effort),))
     assert subject_of(logged).drive[0] == pytest.approx(9.0)
+
+
+class Bent:
+    """Two numbers of which only the sum of their exponentials shows: a valley that bends."""
+
+    size = 2
+    bounds = (np.full(2, -5.0), np.full(2, 5.0))
+
+    def __init__(self) -> None:
+        self.derivatives = 0
+
+    def clip(self, z: Float64) -> Float64:
+        return z
+
+    def residual(self, zs: list[Float64], segments: tuple[int, ...]) -> Float64:
+        return np.stack([np.r_[100.0 * (np.exp(z).sum() - 4.0), 5.0 * z, 50.0] for z in zs])
+
+    def jacobian(self, z: Float64, segments: tuple[int, ...]) -> tuple[Float64, Float64]:
+        self.derivatives += 1
+        own = np.concatenate([100.0 * np.exp(z)[None], 5.0 * np.eye(2), np.zeros((1, 2))])
+        return self.residual([z], segments)[0], own
+
+
+def test_the_less_is_enough_the_further_a_fit_follows_a_valley_that_bends():
+    begun = np.array([1.3, np.log(4.0 - np.exp(1.3))])
+    space: Any = Bent()
+    assert polish(space, begun, (), 12, enough=1e-3).z[0] > 1.2
+    space.derivatives = 0
+    found = polish(space, begun, (), 12, enough=1e-6)
+    assert found.z == pytest.approx(np.full(2, np.log(2.0)), abs=0.05)
+    assert space.derivatives < 12  # each for several steps

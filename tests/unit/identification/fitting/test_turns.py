@@ -10,7 +10,14 @@ import pytest
 from shared.identification.catalogue.command_latency import EFFECT as LATENCY
 from shared.identification.catalogue.sample_and_hold import EFFECT as HOLD
 from shared.identification.effect import Candidate
-from shared.identification.fitting.turns import LIKELY, NEAR, Turning, aligned, turning_of
+from shared.identification.fitting.turns import (
+    LIKELY,
+    NEAR,
+    Turning,
+    _around,  # pyright: ignore[reportPrivateUsage]
+    aligned,
+    turning_of,
+)
 
 PROBES = (0.02, 0.25)
 SECONDS = 6
@@ -132,3 +139,12 @@ def test_what_fits_already_stays():
     space: Any = Latched(0.128, 0.364)
     z = np.array([0.1, 0.2, 0.3, 0.128 / PROBES[0], 0.364 / PROBES[1]])
     assert aligned(space, z, tuple(range(SECONDS))) is z
+
+
+def test_what_lies_about_two_neighbours_is_looked_at_once():
+    alone = _around([(0.02, 0.25)], 1e-4, 0.1)
+    assert len(alone) == 15
+    both = _around([(0.02, 0.25), (0.02005, 0.25)], 1e-4, 0.1)
+    assert both[:15] == alone
+    assert len(both) == 18  # of the second one, what is a whole step further
+    assert len(_around([(0.02, 0.25), (0.023, 0.25)], 1e-4, 0.1)) == 30
