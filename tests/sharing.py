@@ -9,7 +9,7 @@ from typing import Final
 _KINDS: Final = ("jobs", "", "files", "in time")
 """In this order: those that stay with one worker, all of them or those of a file; "": any test."""
 _INTEGRATION: Final = "tests/integration/"
-_COMPUTING: Final = "tests/integration/identification/"
+_COMPUTING: Final = ("identification", "sim")
 """Integration tests that start no processes."""
 _JOBS: Final = ("training", "tournament", "serial", "closing_the_loop", "identify_job")
 """Integration tests of whole jobs, which wait for nothing but their own processes."""
@@ -38,7 +38,9 @@ def _file(nodeid: str) -> str:
 def _kind(file: str) -> str:
     if file == _LONG:
         return ""
-    if not file.startswith(_INTEGRATION) or file.startswith(_COMPUTING):
+    if not file.startswith(_INTEGRATION):
         return "files"
     part = file.removeprefix(_INTEGRATION).partition("/")[0]
+    if part in _COMPUTING:
+        return "files"
     return "jobs" if part in _JOBS else "in time"

@@ -34,7 +34,7 @@ def looked_at(wish: str, seed: int) -> tuple[Truth, Verdict]:
     """Hide something in a short data set and say what is found; half of the nulls are imperfect."""
     wishes = (wish_of(wish),) if wish else ()
     recipe = Recipe(
-        arm="arm3", seconds=3.0, train=2, test=2, seed=seed, wishes=wishes,
+        arm="arm3", seconds=2.4, train=2, test=2, seed=seed, wishes=wishes,
         is_imperfect=not wish and seed % 2 == 0,
         reach=0.08 if (wish, seed) in (LIFTS, PULLS) else 1.0,
     )  # fmt: skip

@@ -1,5 +1,6 @@
 """What was held out, asked whether it goes as a cause says."""
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -37,6 +38,7 @@ class Looked:
         self.before = polish(space, np.zeros(space.size), self.problem.of("train"), 4)
         self.held = Held(self.before)
 
+    @functools.cache  # noqa: B019
     def after(self, candidate: Candidate) -> Fit:
         grown = self.before.space.grown(candidate)
         return polish(grown, np.r_[self.before.z, 0.5], self.problem.of("train"), 4)
