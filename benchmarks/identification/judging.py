@@ -52,6 +52,9 @@ def _cause(cause: Cause) -> dict[str, Any]:
         "value": cause.value,
         "interval": [cause.interval.low, cause.interval.high],
         "others": dict(cause.others),
+        "other_intervals": {
+            name: [each.low, each.high] for name, each in cause.other_intervals.items()
+        },
     }
 
 

@@ -37,6 +37,8 @@ class Cause(_Part, frozen=True, kw_only=True):
     """Further quantities of the same effect, by name."""
     other_units: dict[str, str] = {}
     """Theirs; older verdicts do not say."""
+    other_intervals: dict[str, Interval] = {}
+    """Of those that say how much, not how; older verdicts do not say."""
     share: float = 0.0
     """Of the explainable held-out residual that it removes by itself."""
     share_interval: Interval | None = None

@@ -145,8 +145,13 @@ def _cause(cause: Cause) -> Html:
             tag("b", words.quantity_text(told.value, told.unit, told.interval)),
         ),
         *(
-            (name, words.quantity_text(value, cause.other_units.get(name, "")))
-            for name, value in cause.others.items()
+            (
+                name,
+                words.quantity_text(
+                    value, told.other_units.get(name, ""), told.other_intervals.get(name)
+                ),
+            )
+            for name, value in told.others.items()
         ),
         ("explains by itself", words.share_text(cause.share, cause.share_interval)),
     ]

@@ -29,17 +29,20 @@ def causes_of(found: Search, widths: Float64) -> tuple[Cause, ...]:
 def _cause(found: Search, tried: Tried, values: Float64, widths: Float64, base: float) -> Cause:
     candidate = tried.candidate
     quantities = candidate.effect.quantities(found.problem.subject, candidate.place)
+    forms = candidate.forms(found.problem.subject)
+    ends = [
+        _around(float(value), CALIBRATED * float(width) * each.probe)
+        for each, value, width in zip(quantities, values, widths, strict=True)
+    ]
     first = quantities[0]
-    half = CALIBRATED * float(widths[0]) * first.probe
-    value = float(values[0])
     low, high = tried.gain.share_interval(base)
     return Cause(
         effect=candidate.effect.name,
         where=candidate.place,
         quantity=first.name,
-        value=value,
+        value=float(values[0]),
         unit=first.unit,
-        interval=Interval(low=value - half, high=value + half),
+        interval=ends[0],
         title=candidate.effect.title,
         signature=candidate.effect.signature,
         others={
@@ -47,9 +50,18 @@ def _cause(found: Search, tried: Tried, values: Float64, widths: Float64, base: 
             for each, number in zip(quantities[1:], values[1:], strict=True)
         },
         other_units={each.name: each.unit for each in quantities[1:]},
+        other_intervals={
+            each.name: own
+            for each, own, is_form in zip(quantities[1:], ends[1:], forms[1:], strict=True)
+            if not is_form
+        },
         share=tried.gain.share(base),
         share_interval=Interval(low=low, high=high),
     )
+
+
+def _around(value: float, half: float) -> Interval:
+    return Interval(low=value - half, high=value + half)
 
 
 def rival(found: Search, tried: Tried, base: float) -> Cause:

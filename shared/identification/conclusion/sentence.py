@@ -100,6 +100,7 @@ def as_told(cause: Cause) -> Cause:
 
     ``inverse_limit`` in 1/(N m) is a limit in N m; its upper end is infinite where the inverse may
     be 0, which is no limit. Of a cosine and a sine it is the amplitude, as well known as either.
+    Where the first of several numbers may be 0, it is the one that is most surely not.
     """
     if cause.quantity == "cosine":
         amplitude = math.hypot(cause.value, cause.others["sine"])
@@ -108,7 +109,7 @@ def as_told(cause: Cause) -> Cause:
         return msgspec.structs.replace(cause, quantity="amplitude", value=amplitude, interval=ends)
     name = cause.quantity.removeprefix("inverse_")
     if name == cause.quantity or not cause.value > 0.0:
-        return cause
+        return _by_surest(cause)
     low, high = cause.interval.low, cause.interval.high
     return msgspec.structs.replace(
         cause,
@@ -117,6 +118,31 @@ def as_told(cause: Cause) -> Cause:
         unit=cause.unit.removeprefix("1/").strip("()"),
         interval=Interval(low=1.0 / high, high=1.0 / low if low > 0.0 else float("inf")),
     )
+
+
+def _by_surest(cause: Cause) -> Cause:
+    """Return a cause with the number first that is most surely not 0, where its first may be."""
+    if not _may_be_nothing(cause.interval):
+        return cause
+    sure = {
+        name: abs(cause.others[name]) / max(each.high - each.low, 1e-300)
+        for name, each in cause.other_intervals.items()
+        if not _may_be_nothing(each)
+    }
+    if not sure:
+        return cause
+    name, first = max(sure, key=lambda each: sure[each]), cause.quantity
+    values = {first: cause.value, **cause.others}
+    units = {first: cause.unit, **cause.other_units}
+    intervals = {first: cause.interval, **cause.other_intervals}
+    return msgspec.structs.replace(
+        cause, quantity=name, value=values.pop(name), unit=units.pop(name),
+        interval=intervals.pop(name), others=values, other_units=units, other_intervals=intervals,
+    )  # fmt: skip
+
+
+def _may_be_nothing(interval: Interval) -> bool:
+    return interval.low <= 0.0 <= interval.high
 
 
 def _size(cause: Cause) -> str:

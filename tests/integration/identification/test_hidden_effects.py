@@ -51,6 +51,8 @@ def test_what_is_hidden_is_found_where_it_is(wish: str, seed: int) -> None:
         (hidden.name, hidden.where)
     ], verdict.sentence
     assert verdict.causes[0].value == pytest.approx(hidden.quantities[0].value, rel=0.2)
+    for name, interval in verdict.causes[0].other_intervals.items():
+        assert interval.low < verdict.causes[0].others[name] < interval.high
     assert verdict.held_out.extended < 1.35 < 1.5 * verdict.held_out.base_fit
 
 

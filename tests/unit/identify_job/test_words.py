@@ -15,7 +15,7 @@ from services.jobs.identify.words import (
     unexplained_text,
     verdict_text,
 )
-from shared.identification.conclusion.sentence import sentence_of
+from shared.identification.conclusion.sentence import as_told, sentence_of
 from shared.identification.verdict import Cause, Interval
 from tests.unit.identify_job.examples import WORDS, example
 
@@ -68,6 +68,23 @@ def test_a_ripple_is_told_by_its_amplitude() -> None:
         title="it ripples", signature="",
     )  # fmt: skip
     assert cause_text(ripple) == "it ripples at elbow: amplitude 0.2 N m (0.19 to 0.21)"
+
+
+def test_a_cause_is_told_by_the_number_that_is_most_surely_not_nothing() -> None:
+    tilt = Cause(
+        effect="gravity_tilt", where="", quantity="x", value=0.004, unit="rad",
+        interval=Interval(low=-0.016, high=0.024), others={"y": -0.03, "z": 0.01, "falloff": 2.0},
+        other_units={"y": "rad", "z": "m"}, title="it leans", signature="",
+        other_intervals={"y": Interval(low=-0.04, high=-0.02), "z": Interval(low=0.001, high=0.02)},
+    )  # fmt: skip
+    told = as_told(tilt)
+    minus = "\N{MINUS SIGN}"
+    assert cause_text(tilt) == f"it leans: y {minus}30 mrad ({minus}40 to {minus}20)"
+    assert told.others == {"x": 0.004, "z": 0.01, "falloff": 2.0}
+    assert told.other_intervals["x"] == tilt.interval
+    sure = msgspec.structs.replace(tilt, interval=Interval(low=0.001, high=0.007))
+    alone = msgspec.structs.replace(tilt, other_intervals={"z": Interval(low=-1.0, high=1.0)})
+    assert [as_told(sure), as_told(alone)] == [sure, alone]
 
 
 @pytest.mark.parametrize(
