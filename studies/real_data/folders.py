@@ -34,6 +34,7 @@ def recording(
 def write(
     folder: Path, model: str, control: Control, joints: tuple[str, ...],
     trajectories: tuple[Trajectory, ...], notes: Mapping[str, Any],
+    driven: tuple[str, ...] = (),
 ) -> None:  # fmt: skip
     """Write recordings beside the MJCF they are compared with.
 
@@ -41,13 +42,14 @@ def write(
         folder: the new data set.
         model: the MJCF's text; it becomes ``model.xml``.
         control: what the commands are.
-        joints: names, of actuators too.
+        joints: names.
         trajectories: the recordings.
         notes: source and licence, for people.
+        driven: joints with an actuator of their name; all if empty.
     """
     dataset = Dataset(
         folder=folder, source=ModelSource("mjcf", folder / "model.xml"), control=control,
-        joints=joints, actuators=joints, trajectories=trajectories, caveats=(), hash="",
+        joints=joints, actuators=driven or joints, trajectories=trajectories, caveats=(), hash="",
     )  # fmt: skip
     write_dataset(dataset, folder, notes, {"model.xml": model.encode()})
 

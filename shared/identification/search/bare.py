@@ -120,8 +120,8 @@ def with_drives(
         if other.cost < together.cost - _MUCH_BETTER:
             together = other
     kept = _needed(together, test, rng)
-    if not kept:
-        return None
+    if not set(kept) & set(lacks):
+        return None  # what the tool carries is found like any other cause
     is_whole = len(kept) == len(together.space.candidates)
     fit = together if is_whole else _fitted(Space(problem, kept), train)
     after = stretches(problem, fit.variant, test)

@@ -59,6 +59,18 @@ def test_a_load_is_found_with_them_where_there_is_one(tmp_path: Path, load: floa
     assert sizes == ([pytest.approx(load, rel=0.05)] if load else [])
 
 
+def test_a_load_of_an_arm_that_does_not_rub_is_left_to_the_search(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    for joint in JOINTS:
+        monkeypatch.setitem(FRICTION, joint, 0.0)
+    problem = problem_of_geared(tmp_path, 1.5)
+    known = candidates(problem, "coulomb_friction", "payload")
+    base = _base(problem)
+    lacks = lacking(base.space, known)
+    assert with_drives(base, lacks, np.random.default_rng(0), loads_of(known)) is None
+
+
 def test_what_an_arm_without_rotors_leaves_says_nothing_of_noise(tmp_path: Path):
     problem = problem_of_geared(tmp_path, is_bare=True)
     read = replace(problem.noise, joints=np.full(len(JOINTS), 1e-5))
