@@ -11,7 +11,7 @@ from shared.identification.gate.clusters import Integers, by_channel, by_stretch
 CALIBRATED = 1.35
 """Times the half width of a cause's size, since no simulation is quite the arm: without it 57 of 67
 intervals covered on development data, with it 62 (docs/identify.md)."""
-_SURE = float(ndtri(0.975))
+SURE = float(ndtri(0.975))
 """Standard errors by which a cause is surely off nothing (95 %)."""
 _NOTHING = 0.01
 """What no residual changes by, in noise floors."""
@@ -33,7 +33,7 @@ def half_widths(fit: Fit, segments: tuple[int, ...]) -> Float64:
 
 def is_there(fit: Fit, candidate: Candidate, segments: tuple[int, ...]) -> bool:
     """Return whether a cause in a fit is surely more than nothing (95 %), see :func:`sureness`."""
-    return sureness(fit, candidate, segments) > _SURE
+    return sureness(fit, candidate, segments) > SURE
 
 
 def sureness(fit: Fit, candidate: Candidate, segments: tuple[int, ...]) -> float:
@@ -54,7 +54,7 @@ def sureness(fit: Fit, candidate: Candidate, segments: tuple[int, ...]) -> float
     told = [_covariance(fit, clusters) for clusters in ways if clusters]
     own = np.arange(fit.space.size)[fit.space.where(candidate)]
     first = min(_errors(fit.z, *each, own[:1]) for each in told)
-    if first > _SURE:
+    if first > SURE:
         return first
     amounts = own[[0, *_that_do_something(fit, candidate, segments)]]
     return max(first, min(_errors(fit.z, *each, amounts) for each in told))

@@ -9,7 +9,7 @@ from shared.identification.fitting.parameters import bends
 from shared.identification.fitting.refit import settle
 from shared.identification.fitting.space import Space
 from shared.identification.fitting.turns import LATE
-from shared.identification.gate.certainty import is_there
+from shared.identification.gate.certainty import SURE, sureness
 from shared.identification.gate.held_out import (
     LEAST_SHARE,
     compare,
@@ -61,6 +61,9 @@ _BENT = 15.0
 _LOADS = {"counterbalance", "torque_bias", "gravity_tilt", "joint_spring"}
 """Causes of which none is told from the others by a few postures: near one of them a load that
 depends on posture is a constant torque, whatever numbers either has."""
+_OF_MANY = 3.2
+"""Standard errors that a cause is off nothing by where noise was not measured: of forty candidates
+one is by so much by chance once in twenty times (Bonferroni)."""
 _LEANS = {"encoder_offset", "payload"}
 """A tool that is heavy beside its middle hangs as one does at a joint of which the encoder has
 another zero; what a payload's shape adds to that is not modelled."""
@@ -138,9 +141,10 @@ def _round(
         found.tried.setdefault(one.candidate.label, one)
     base = float(found.base_losses.mean())
     useful = [one for one in tried if one.is_event or one.gain.is_useful(base)]
+    useful = _sure(useful, train)
     if not useful:
         return False
-    best, rivals = _simplest(_sure(useful, train), found.rng)
+    best, rivals = _simplest(useful, found.rng)
     rivals = tuple(one for one in rivals if _is_rival(found, best, one, train, test))
     begun = go_down(best.fit, train)  # with the derivative that it has
     fit = polish(best.fit.space, begun.z, train, 4, enough=1e-4)
@@ -239,11 +243,15 @@ def _usually(losses: Float64) -> float:
 def _sure(useful: list[Tried], train: tuple[int, ...]) -> list[Tried]:
     """Return what is surely more than nothing, or all if nothing is, as of two causes by half.
 
-    A spring of no surely known stiffness, whose rest is far off, is a constant torque.
+    A spring of no surely known stiffness, whose rest is far off, is a constant torque. Where no
+    repeat says what noise is, there may be causes without end for what is none, so each has to be
+    surer than the best of many would be by chance, and none may be.
     """
-    return [
-        one for one in useful if one.is_event or is_there(one.fit, one.candidate, train)
-    ] or useful
+    errors = [np.inf if one.is_event else sureness(one.fit, one.candidate, train) for one in useful]
+    is_measured = all(one.fit.space.problem.noise.is_measured for one in useful)
+    least = SURE if is_measured else _OF_MANY
+    sure = [one for one, off in zip(useful, errors, strict=True) if off > least]
+    return sure or (useful if is_measured else [])
 
 
 def _simplest(useful: list[Tried], rng: np.random.Generator) -> tuple[Tried, tuple[Tried, ...]]:

@@ -14,8 +14,8 @@ from shared.identification.effect import Candidate, Effect
 from shared.identification.fitting.fit import Fit, polish
 from shared.identification.fitting.space import Space
 from shared.identification.gate.certainty import (
-    _SURE,  # pyright: ignore[reportPrivateUsage]
     CALIBRATED,
+    SURE,
     _errors,  # pyright: ignore[reportPrivateUsage]
     half_widths,
     is_there,
@@ -92,8 +92,8 @@ def test_numbers_of_which_only_a_sum_is_known_are_surely_something_together():
     covariance = np.array([[1.0, -0.97], [-0.97, 1.0]])
     z = 1.5 * CALIBRATED * np.ones(2)
     one, both = np.array([0]), np.array([0, 1])
-    assert _errors(z, covariance, 30, one) < _SURE < _errors(z, covariance, 30, both)
-    assert _errors(z * [1.0, -1.0], covariance, 30, both) < _SURE
+    assert _errors(z, covariance, 30, one) < SURE < _errors(z, covariance, 30, both)
+    assert _errors(z * [1.0, -1.0], covariance, 30, both) < SURE
     assert _errors(z, covariance, 2, both) == 0.0  # hardly anything to tell it from
 
 
@@ -113,5 +113,5 @@ def test_of_what_is_nothing_a_twentieth_looks_sure():
     for _ in range(2000):
         seen = rng.normal(size=(13, 3)) @ spread.T
         told = np.cov(seen, rowvar=False) / 13.0 / CALIBRATED**2
-        sure += _errors(seen.mean(axis=0), told, 12, np.arange(3)) > _SURE
+        sure += _errors(seen.mean(axis=0), told, 12, np.arange(3)) > SURE
     assert 0.035 < sure / 2000 < 0.065

@@ -23,6 +23,7 @@ from shared.identification.catalogue.torque_gain import EFFECT as GAIN
 from shared.identification.dataset.types import Dataset, Float64
 from shared.identification.effect import Candidate
 from shared.identification.find import identify
+from shared.identification.gate.certainty import SURE, sureness
 from shared.identification.gate.foretold import Foretold
 from shared.identification.gate.held_out import Taken
 from shared.identification.hidden.generator import hide
@@ -126,6 +127,27 @@ def test_a_cause_that_may_as_well_be_nothing_is_taken_only_if_all_may(searches: 
         found = _sure(useful, train)
         assert len(found) == len(sure)
         assert all(one is other for one, other in zip(found, sure, strict=True))
+
+
+def test_where_noise_was_not_measured_what_may_as_well_be_nothing_is_never_taken(
+    searches: Searches,
+):
+    noise = replace(searches.problem.noise, is_measured=False)
+    problem = replace(searches.problem, noise=noise)
+    one = searches.tried(ELBOW, _BAD, _GOOD + 0.5)
+    space = replace(one.fit.space, problem=problem)
+    own, train = space.where(ELBOW), problem.of("train")
+
+    def sized(errors: float) -> Tried:
+        z = one.fit.z.copy()
+        z[own] *= errors / sureness(one.fit, ELBOW, train)
+        return replace(one, fit=replace(one.fit, space=space, z=z))
+
+    unsure, sure = sized(4.0), sized(20.0)
+    assert SURE < sureness(unsure.fit, ELBOW, train) < 3.0
+    assert not _sure([unsure], train)
+    (kept,) = _sure([unsure, sure], train)
+    assert kept is sure
 
 
 def test_turns_so_short_that_they_are_a_delay_are_a_rival_of_it(searches: Searches):
