@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,28 @@ def recording(
     at = at - at[0]
     start = np.zeros(q.shape[1]) if qd is None else qd[0]
     return Trajectory(name, split, "", q[0], start, at, torque, at, q, qd=qd)
+
+
+def in_parts(
+    at: Float64, q: Float64, torque: Float64, ends: tuple[float, float], parts: int, every: int = 1
+) -> tuple[Trajectory, ...]:
+    """Return a log of torques as recordings of one length, of which every third is held out.
+
+    Args:
+        at: float64[T] (s).
+        q: float64[T, J] (rad, m).
+        torque: float64[T, A] (N m, N).
+        ends: what of it is taken (s).
+        parts: recordings that it becomes.
+        every: of so many readings one is taken.
+    """
+    cuts = pairwise(np.searchsorted(at, np.linspace(*ends, parts + 1)))
+    found: list[Trajectory] = []
+    for number, (first, last) in enumerate(cuts, 1):
+        rows = slice(first, last, every)
+        split: Split = "test" if number % 3 == 0 else "train"
+        found.append(recording(f"part_{number}", split, at[rows], q[rows], None, torque[rows]))
+    return tuple(found)
 
 
 def write(

@@ -10,13 +10,12 @@ Run ``python -m studies.real_data.panda OUT --raw FOLDER``.
 """
 
 import argparse
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from shared.identification.dataset.types import Float64, Trajectory
-from studies.real_data.folders import arm_of_motors, hashes_of, recording, there, write
+from shared.identification.dataset.types import Float64
+from studies.real_data.folders import arm_of_motors, hashes_of, in_parts, there, write
 
 JOINTS = tuple(f"joint{number}" for number in range(1, 8))
 FILES = {name: f"exciting_traj_{name}.txt" for name in ("time", "positions", "torques")}
@@ -49,19 +48,12 @@ def convert(out: Path, raw: Path, seconds: float = 15.0, every: int = 5, parts: 
     at: Float64 = np.loadtxt(paths["time"])
     q, torque = (np.loadtxt(paths[name]).reshape(-1, 7) for name in ("positions", "torques"))
     at = at[: min(len(at), len(q), len(torque))]
-    cuts = np.searchsorted(at, np.linspace(_BEGIN, seconds, parts + 1))
-    trajectories: list[Trajectory] = []
-    for number, (first, last) in enumerate(pairwise(cuts), 1):
-        rows = slice(first, last, every)
-        split = "test" if number % 3 == 0 else "train"
-        trajectories.append(
-            recording(f"part_{number}", split, at[rows], q[rows], None, torque[rows])
-        )
+    trajectories = in_parts(at, q, torque, (_BEGIN, seconds), parts, every)
     notes = {
         "source": "github.com/marcocognetti/FrankaEmikaPandaDynModel at 44f1ec8",
         "sha256": hashes_of(paths),
     }
-    write(out, _model(), "torque", JOINTS, tuple(trajectories), notes)
+    write(out, _model(), "torque", JOINTS, trajectories, notes)
 
 
 def _model() -> str:

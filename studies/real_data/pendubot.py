@@ -9,13 +9,12 @@ Run ``python -m studies.real_data.pendubot OUT --raw FOLDER``.
 """
 
 import argparse
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from shared.identification.dataset.types import Float64, Trajectory
-from studies.real_data.folders import arm_of_motors, hashes_of, recording, there, write
+from shared.identification.dataset.types import Float64
+from studies.real_data.folders import arm_of_motors, hashes_of, in_parts, there, write
 
 JOINTS = ("shoulder", "elbow")
 DRIVEN = JOINTS[:1]
@@ -47,20 +46,13 @@ def convert(out: Path, raw: Path, seconds: float = 12.0, parts: int = 6) -> None
     path = there(raw, FILE)
     table: Float64 = np.loadtxt(path, delimiter=",")
     at, q, torque = table[:, 0] - table[0, 0], table[:, 1:3], _TORQUE * table[:, 5:6]
-    cuts = np.searchsorted(at, np.linspace(0.0, seconds, parts + 1))
-    trajectories: list[Trajectory] = []
-    for number, (first, last) in enumerate(pairwise(cuts), 1):
-        rows = slice(first, last)
-        split = "test" if number % 3 == 0 else "train"
-        trajectories.append(
-            recording(f"part_{number}", split, at[rows], q[rows], None, torque[rows])
-        )
+    trajectories = in_parts(at, q, torque, (0.0, seconds), parts)
     notes = {
         "source": "github.com/shamilmamedov/dynamic_calibration at 0eeac77",
         "sha256": hashes_of({FILE: path}),
     }
     model = arm_of_motors("pendubot", DRIVEN, _BODIES)
-    write(out, model, "torque", JOINTS, tuple(trajectories), notes, DRIVEN)
+    write(out, model, "torque", JOINTS, trajectories, notes, DRIVEN)
 
 
 if __name__ == "__main__":

@@ -31,9 +31,14 @@ def half_widths(fit: Fit, segments: tuple[int, ...]) -> Float64:
     return factor * np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
 
-def is_there(fit: Fit, candidate: Candidate, segments: tuple[int, ...]) -> bool:
-    """Return whether a cause in a fit is surely more than nothing (95 %), see :func:`sureness`."""
-    return sureness(fit, candidate, segments) > SURE
+def is_there(
+    fit: Fit, candidate: Candidate, segments: tuple[int, ...], errors: float = SURE
+) -> bool:
+    """Return whether a cause in a fit is surely more than nothing, see :func:`sureness`.
+
+    By so many standard errors; 95 % unless more are asked for.
+    """
+    return sureness(fit, candidate, segments) > errors
 
 
 def sureness(fit: Fit, candidate: Candidate, segments: tuple[int, ...]) -> float:

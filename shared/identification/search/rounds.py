@@ -9,7 +9,7 @@ from shared.identification.fitting.parameters import bends
 from shared.identification.fitting.refit import settle
 from shared.identification.fitting.space import Space
 from shared.identification.fitting.turns import LATE
-from shared.identification.gate.certainty import SURE, sureness
+from shared.identification.gate.certainty import SURE, is_there
 from shared.identification.gate.held_out import (
     LEAST_SHARE,
     compare,
@@ -141,7 +141,7 @@ def _round(
         found.tried.setdefault(one.candidate.label, one)
     base = float(found.base_losses.mean())
     useful = [one for one in tried if one.is_event or one.gain.is_useful(base)]
-    useful = _sure(useful, train)
+    useful = _sure(useful, train, is_measured)
     if not useful:
         return False
     best, rivals = _simplest(useful, found.rng)
@@ -240,17 +240,15 @@ def _usually(losses: Float64) -> float:
     return STANDS_OUT * max(float(np.median(losses)), 1.0)
 
 
-def _sure(useful: list[Tried], train: tuple[int, ...]) -> list[Tried]:
+def _sure(useful: list[Tried], train: tuple[int, ...], is_measured: bool) -> list[Tried]:
     """Return what is surely more than nothing, or all if nothing is, as of two causes by half.
 
     A spring of no surely known stiffness, whose rest is far off, is a constant torque. Where no
     repeat says what noise is, there may be causes without end for what is none, so each has to be
     surer than the best of many would be by chance, and none may be.
     """
-    errors = [np.inf if one.is_event else sureness(one.fit, one.candidate, train) for one in useful]
-    is_measured = all(one.fit.space.problem.noise.is_measured for one in useful)
     least = SURE if is_measured else _OF_MANY
-    sure = [one for one, off in zip(useful, errors, strict=True) if off > least]
+    sure = [one for one in useful if one.is_event or is_there(one.fit, one.candidate, train, least)]
     return sure or (useful if is_measured else [])
 
 

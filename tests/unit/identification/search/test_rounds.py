@@ -124,7 +124,7 @@ def test_a_cause_that_may_as_well_be_nothing_is_taken_only_if_all_may(searches: 
         ([nothing], [nothing]),
         ([event, there], [event, there]),
     ):
-        found = _sure(useful, train)
+        found = _sure(useful, train, True)
         assert len(found) == len(sure)
         assert all(one is other for one, other in zip(found, sure, strict=True))
 
@@ -132,21 +132,18 @@ def test_a_cause_that_may_as_well_be_nothing_is_taken_only_if_all_may(searches: 
 def test_where_noise_was_not_measured_what_may_as_well_be_nothing_is_never_taken(
     searches: Searches,
 ):
-    noise = replace(searches.problem.noise, is_measured=False)
-    problem = replace(searches.problem, noise=noise)
     one = searches.tried(ELBOW, _BAD, _GOOD + 0.5)
-    space = replace(one.fit.space, problem=problem)
-    own, train = space.where(ELBOW), problem.of("train")
+    own, train = one.fit.space.where(ELBOW), searches.problem.of("train")
 
     def sized(errors: float) -> Tried:
         z = one.fit.z.copy()
         z[own] *= errors / sureness(one.fit, ELBOW, train)
-        return replace(one, fit=replace(one.fit, space=space, z=z))
+        return replace(one, fit=replace(one.fit, z=z))
 
     unsure, sure = sized(4.0), sized(20.0)
     assert SURE < sureness(unsure.fit, ELBOW, train) < 3.0
-    assert not _sure([unsure], train)
-    (kept,) = _sure([unsure, sure], train)
+    assert not _sure([unsure], train, False)
+    (kept,) = _sure([unsure, sure], train, False)
     assert kept is sure
 
 
