@@ -21,6 +21,8 @@ Cell = Literal["single", "null", "null_imperfect", "two", "outside", "tie"]
 CELLS: Final[tuple[str, ...]] = get_args(Cell)
 _ARMS: tuple[ArmName, ...] = ("pr2", "arm3")
 """By turns; effects that neither can have go to ``torque2``."""
+_LATER: Final = ("setpoint_ramp",)
+"""Effects that the protocol began without: their trials are numbered after all others."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,8 @@ class Trial:
     cell: Cell
     recipe: Recipe
     without: frozenset[str] = frozenset()
+    is_later: bool = False
+    """Whether it came to the protocol when a part of that was done: the order of that stays."""
 
     @property
     def key(self) -> str:
@@ -74,17 +78,22 @@ def arms_of(name: str) -> tuple[ArmName, ...]:
     return tuple(arm for arm in _ARMS if arm in able) or able
 
 
+def _names() -> tuple[str, ...]:
+    """Return what can be hidden, in the order of the seeds."""
+    return (*(name for name in hidden_effects() if name not in _LATER), *_LATER)
+
+
 def _scene(arm: ArmName) -> Scene:
     return Scene(ARMS[arm], ("a", "a_again", "b"), ("a", "a_again", "b"), 6.0)
 
 
 def _single(count: int) -> Iterator[Trial]:
-    for number, name in enumerate(hidden_effects()):
+    for number, name in enumerate(_names()):
         arms = arms_of(name)
         for turn in range(count):
             seed = FIRST_SEED + 100 * number + turn
-            arm = arms[turn % len(arms)]
-            yield Trial("single", Recipe(arm=arm, seed=seed, wishes=(Wish(name),)))
+            recipe = Recipe(arm=arms[turn % len(arms)], seed=seed, wishes=(Wish(name),))
+            yield Trial("single", recipe, is_later=name in _LATER)
 
 
 def _nulls(cell: Cell, count: int, *, is_imperfect: bool) -> Iterator[Trial]:
@@ -102,7 +111,7 @@ def _two(count: int) -> Iterator[Trial]:
 
 
 def _outside(count: int) -> Iterator[Trial]:
-    names = tuple(hidden_effects())
+    names = tuple(name for name in _names() if name not in _LATER)
     for turn in range(count):
         name = names[turn % len(names)]
         arms = arms_of(name)

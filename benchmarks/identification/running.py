@@ -90,7 +90,13 @@ def by_turns(trials: Sequence[Trial]) -> list[Trial]:
     """Return the trials so that each cell is spread evenly over all of them.
 
     Within a cell they are shuffled, always alike: what is cut short is of every effect and arm.
+    Those that came to the protocol later follow in the same way.
     """
+    later = [trial for trial in trials if trial.is_later]
+    return _mixed([trial for trial in trials if not trial.is_later]) + _mixed(later)
+
+
+def _mixed(trials: Sequence[Trial]) -> list[Trial]:
     counts = Counter(trial.cell for trial in trials)
     seen: Counter[str] = Counter()
     places: list[float] = []

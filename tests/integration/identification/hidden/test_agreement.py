@@ -13,6 +13,7 @@ EXACT = [
     ("arm3", "tracker_latency", "", 0.02, 0.03),
     ("arm3", "clock_skew", "", 3000.0, 0.05),
     ("arm3", "sample_and_hold", "", 0.0523, 0.02),
+    ("arm3", "setpoint_ramp", "", 0.01, 0.02),
     ("arm3", "dropped_packets", "", 0.15, 0.02),
     ("arm3", "payload", "", 0.3, 0.02),
     ("arm3", "gravity_tilt", "", 0.05, 0.02),

@@ -76,6 +76,20 @@ def test_what_is_cut_short_is_of_many_effects_and_both_arms():
     assert {each.recipe.arm for each in singles} >= {"pr2", "arm3"}
 
 
+def test_what_came_to_the_protocol_later_runs_after_all_else_and_changes_none_of_its_seeds():
+    trials = by_turns(protocol())
+    later = [each for each in trials if each.is_later]
+    assert later
+    assert trials[-len(later) :] == later
+    seeds = {each.recipe.seed for each in trials if not each.is_later and each.cell == "single"}
+    assert all(each.recipe.seed > max(seeds) for each in later)
+    assert [each.key for each in trials[:2]] == KEPT
+
+
+KEPT = ["single/torque_gain/pr2/22611", "single/encoder_offset/pr2/21118"]
+"""The order that rows of the results are of, which ``--skip`` counts in."""
+
+
 def test_no_trial_is_begun_after_the_time_is_up(tmp_path):
     path = tmp_path / "records.jsonl"
     path.write_text(json.dumps(record(key=protocol(0.05)[3].key)) + "\n")

@@ -1,0 +1,53 @@
+"""Set points ramp to each command: a filter that goes on from step to step, as firmware has it."""
+
+import numpy as np
+
+from shared.sim.arm import Float64
+from shared.sim.hidden.effect import Case, Hidden, Scene, whole_arm
+from shared.sim.hidden.robot import Hold, Robot
+from shared.sim.plant.signals import Signal
+
+
+def _enter(robot: Robot, case: Case) -> None:
+    robot.hold = lambda: _filter(1.0 / case.size, robot.timestep)
+
+
+def _filter(acceleration: float, timestep: float) -> Hold:
+    """Return what brings a set point to its command, never too fast to stop there.
+
+    In halves of a step: a command comes where one begins, and steps of drives begin half of one
+    earlier.
+    """
+    half = 0.5 * timestep
+    most = acceleration * half
+    place, speed = np.empty(0), np.empty(0)
+
+    def hold(time: float, command: Signal) -> Float64:
+        nonlocal place, speed
+        targets = command.held(np.array([time, time + half]))
+        if not place.size:
+            place, speed = targets[0], np.zeros_like(targets[0])
+        passed = [place]
+        for target in targets:
+            left = target - place
+            fastest = np.sqrt(most**2 + 2.0 * acceleration * np.abs(left)) - most
+            speed = speed + np.clip(np.sign(left) * fastest - speed, -most, most)
+            place = place + half * speed
+            passed.append(place)
+        return 0.25 * (passed[0] + 2.0 * passed[1] + passed[2])
+
+    return hold
+
+
+def _places(scene: Scene) -> tuple[str, ...]:
+    return whole_arm(scene) if scene.arm.control == "position" else ()
+
+
+HIDDEN = Hidden(
+    name="setpoint_ramp",
+    way="a filter of the set point, from step to step",
+    places=_places,
+    sizes=lambda scene, place: (0.002, 0.15),
+    values=lambda case: {"inverse_acceleration": (case.size, "1/(rad/s^2)")},
+    enter=_enter,
+)

@@ -1,0 +1,53 @@
+"""Set points that ramp towards a command: what the firmware of many a servo makes of a step."""
+
+import numpy as np
+
+from shared.sim.arm import Float64
+from shared.sim.plant.signals import Signal
+
+
+def ramped(
+    signal: Signal, acceleration: float, period: float, begin: float, until: float
+) -> Signal:
+    """Return set points that go to each command in the shortest time and stop there.
+
+    Ramps of limited acceleration, planned anew from where the set point is, and as fast as it is,
+    whenever a command comes: what manuals of servos call a profile acceleration.
+
+    Args:
+        signal: float64[C, J] commands.
+        acceleration: the most, either way (rad/s^2, m/s^2).
+        period: of the result (s).
+        begin: where the set point rests at its command, or at the first one if that is later (s).
+        until: when the result may end (s).
+    """
+    first = max(begin, float(signal.at[0]))
+    count = max(int((until - first) / period) + 2, 2)
+    at: Float64 = first + period * np.arange(count, dtype=np.float64)
+    targets = signal.held(at)
+    changes = np.flatnonzero(np.any(np.diff(targets, axis=0) != 0.0, axis=1)) + 1
+    out = np.empty_like(targets)
+    here, place, speed = 0, targets[0], np.zeros(targets.shape[1])
+    for end in [*changes.tolist(), count]:
+        middles: Float64 = period * (0.5 + np.arange(end - here, dtype=np.float64))
+        times = np.r_[middles, period * (end - here)]
+        found, speed = _ramp(place, speed, targets[here], acceleration, times)
+        out[here:end], place, here = found[:-1], found[-1], end
+    return Signal(np.r_[signal.at[0], at], np.concatenate([signal.values[:1], out]))
+
+
+def _ramp(
+    place: Float64, speed: Float64, target: Float64, acceleration: float, times: Float64
+) -> tuple[Float64, Float64]:
+    """Return float64[K, J], where a ramp is at times, and float64[J], its speed at the last one."""
+    stops = place + 0.5 * speed * np.abs(speed) / acceleration
+    way = np.where(target >= stops, 1.0, -1.0)
+    first = way * speed
+    highest = np.sqrt(np.maximum(acceleration * way * (target - place) + 0.5 * first**2, 0.0))
+    rises = (highest - first) / acceleration
+    falls = highest / acceleration
+    up = np.minimum(times[:, None], rises)
+    down = np.clip(times[:, None] - rises, 0.0, falls)
+    gone = first * up + 0.5 * acceleration * up**2 + highest * down - 0.5 * acceleration * down**2
+    last = first + acceleration * (up[-1] - down[-1])
+    return place + way * gone, way * last
