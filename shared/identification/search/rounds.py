@@ -12,6 +12,7 @@ from shared.identification.fitting.turns import LATE
 from shared.identification.gate.certainty import SURE, is_there
 from shared.identification.gate.held_out import (
     LEAST_SHARE,
+    Gain,
     compare,
     floor_of,
     plain_stretches,
@@ -64,6 +65,9 @@ depends on posture is a constant torque, whatever numbers either has."""
 _OF_MANY = 3.2
 """Standard errors that a cause is off nothing by where noise was not measured: of forty candidates
 one is by so much by chance once in twenty times (Bonferroni)."""
+_BESIDE = 0.02
+"""Of the noise: what is held out must follow a cause beside others by so much. No law is quite the
+arm's, and what a named one leaves of what it did is surely there, too, and looks like others."""
 _LEANS = {"encoder_offset", "payload"}
 """A tool that is heavy beside its middle hangs as one does at a joint of which the encoder has
 another zero; what a payload's shape adds to that is not modelled."""
@@ -139,8 +143,7 @@ def _round(
         tried.append(_tried(found, each.screened, fit, is_event))
     for one in tried:
         found.tried.setdefault(one.candidate.label, one)
-    base = float(found.base_losses.mean())
-    useful = [one for one in tried if one.is_event or one.gain.is_useful(base)]
+    useful = [one for one in tried if one.is_event or _is_useful(found, one.gain)]
     useful = _sure(useful, train, is_measured)
     if not useful:
         return False
@@ -149,7 +152,7 @@ def _round(
     begun = go_down(best.fit, train)  # with the derivative that it has
     fit = polish(best.fit.space, begun.z, train, 4, enough=1e-4)
     final = _tried(found, best.screened, fit, best.is_event)
-    if final.gain.loss <= best.gain.loss and (best.is_event or final.gain.is_useful(base)):
+    if final.gain.loss <= best.gain.loss and (best.is_event or _is_useful(found, final.gain)):
         best = final
     best, rivals, family = _elsewhere(found, best, rivals, train, test, progress)
     found.accepted.append(best)
@@ -215,7 +218,8 @@ def _explains_event(
     """Return whether a cause that is in one recording takes away what stands out there.
 
     Held-out recordings cannot show what happened once in another one. What stands out must be far
-    over everything else, more than noise that is the same throughout would ever be.
+    over everything else, more than noise that is the same throughout would ever be, and how large
+    it was has to be known.
 
     Args:
         candidate: the cause.
@@ -228,16 +232,26 @@ def _explains_event(
     after = plain_stretches(fit.space.problem, fit.variant, train)
     worst = int(np.argmax(before - after))
     most = _usually(before)
-    return bool(
+    is_explained = (
         before[worst] > most
         and after[worst] < TAKEN_AWAY * before[worst]
         and after.max() < max(TAKEN_AWAY * before.max(), most)
     )
+    return bool(is_explained) and is_there(fit, candidate, train)
 
 
 def _usually(losses: Float64) -> float:
     """Return what a stretch in which nothing happened leaves at most."""
     return STANDS_OUT * max(float(np.median(losses)), 1.0)
+
+
+def _is_useful(found: Search, gain: Gain) -> bool:
+    """Return whether a cause passes, beside what was named before it if anything was."""
+    if not gain.is_useful(float(found.base_losses.mean())):
+        return False
+    if not found.accepted or not found.problem.noise.is_white:
+        return True
+    return gain.apart is not None and gain.apart.gain >= _BESIDE * gain.apart.before
 
 
 def _sure(useful: list[Tried], train: tuple[int, ...], is_measured: bool) -> list[Tried]:
