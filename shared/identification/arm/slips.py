@@ -1,5 +1,7 @@
 """When a tracker may have slipped, from the tracker and the encoders alone."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from shared.identification.dataset.types import Float64, Trajectory
@@ -8,12 +10,11 @@ from shared.sim.plant.poses import conjugate, rotated
 from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.signals import sampled
 
-_WINDOW = 0.25
-"""Before and after an instant (s)."""
+_WINDOWS = ((0.25, 4.0), (1.0, 2.6))
+"""Before and after an instant (s), and from how many times the median step one is worth a look: a
+long one shows a step that is hardly more than a reading is off by, a short one what is fast."""
 _FEWEST = 5
 """Readings of a window."""
-_CLEAR = 4.0
-"""A step is worth a look from so many times the median one."""
 
 
 def slip_of(rollouts: Rollouts, recording: Trajectory) -> float | None:
@@ -29,14 +30,35 @@ def slip_of(rollouts: Rollouts, recording: Trajectory) -> float | None:
     q = sampled(recording.joints_at, recording.q, at)
     expected = tool_poses(rollouts.plant, rollouts.model, q)
     off = rotated(conjugate(expected[:, 3:]), recording.tracker[:, :3] - expected[:, :3])
-    count = max(_FEWEST, round(_WINDOW / float(np.median(np.diff(at)))))
-    if len(at) < 4 * count:
+    period = float(np.median(np.diff(at)))
+    looks = [
+        _looked(off, max(_FEWEST, round(length / period)), clear) for length, clear in _WINDOWS
+    ]
+    found = max((look for look in looks if look is not None), default=None)
+    if found is None or found.clear <= 1.0:
+        return None
+    edge = _sharpened(off, found.edge, found.count)
+    return 0.5 * float(at[edge - 1] + at[edge])
+
+
+class _Look(NamedTuple):
+    """The largest step in windows of one length."""
+
+    clear: float
+    """How large, in what is worth a look."""
+    edge: int
+    """Which reading is the first after it."""
+    count: int
+    """Readings of a window."""
+
+
+def _looked(off: Float64, count: int, clear: float) -> _Look | None:
+    """Return the largest step of float64[K, 3] (m); None where a recording is too short."""
+    if len(off) < 4 * count:
         return None
     sizes = np.linalg.norm(_steps(off, count), axis=1)
-    if float(sizes.max()) <= _CLEAR * float(np.median(sizes)):
-        return None
-    edge = _sharpened(off, int(np.argmax(sizes)) + count, count)
-    return 0.5 * float(at[edge - 1] + at[edge])
+    size = float(sizes.max() / max(float(np.median(sizes)), 1e-12))
+    return _Look(size / clear, int(np.argmax(sizes)) + count, count)
 
 
 def _steps(values: Float64, count: int) -> Float64:

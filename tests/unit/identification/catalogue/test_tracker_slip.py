@@ -55,6 +55,11 @@ def test_a_slip_is_timed_beside_a_lag_of_the_tracker(subject: Subject):
     assert found == pytest.approx(3.3, abs=0.05)
 
 
+def test_a_slip_of_hardly_more_than_a_reading_is_off_by_is_timed_all_the_same(subject: Subject):
+    seen = [slip_of(subject.nominal, _seen(subject, at, 2.5e-3)) for at in (1.5, 3.0, 4.2)]
+    assert seen == pytest.approx([1.5, 3.0, 4.2], abs=0.1)
+
+
 def test_noise_alone_is_no_slip(subject: Subject):
     assert slip_of(subject.nominal, _seen(subject, 100.0, 0.5e-3)) is None
 
