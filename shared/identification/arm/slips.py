@@ -37,7 +37,7 @@ def slip_of(rollouts: Rollouts, recording: Trajectory) -> float | None:
     found = max((look for look in looks if look is not None), default=None)
     if found is None or found.clear <= 1.0:
         return None
-    edge = _sharpened(off, found.edge, found.count)
+    edge = _sharpened(off, found.edge, found.length)
     return 0.5 * float(at[edge - 1] + at[edge])
 
 
@@ -48,7 +48,7 @@ class _Look(NamedTuple):
     """How large, in what is worth a look."""
     edge: int
     """Which reading is the first after it."""
-    count: int
+    length: int
     """Readings of a window."""
 
 
