@@ -53,12 +53,17 @@ class Foretold:
     """float64[S], the same with the cause."""
 
     @property
-    def is_refuted(self) -> bool:
-        """Return whether they do not, though little else could have made up for it.
+    def is_told(self) -> bool:
+        """Return whether they could tell: base and links do not make up for nearly all of it.
 
         A wrong inertia of a link cannot be seen there: the links' inertia is taken out.
         """
-        return not self.is_seen and self.kept >= _KEPT
+        return self.kept >= _KEPT
+
+    @property
+    def is_refuted(self) -> bool:
+        """Return whether they do not, though they could tell."""
+        return self.is_told and not self.is_seen
 
     @property
     def is_seen(self) -> bool:

@@ -12,7 +12,6 @@ from shared.identification.fitting.turns import LATE
 from shared.identification.gate.certainty import SURE, is_there
 from shared.identification.gate.held_out import (
     LEAST_SHARE,
-    Gain,
     compare,
     floor_of,
     plain_stretches,
@@ -143,7 +142,7 @@ def _round(
         tried.append(_tried(found, each.screened, fit, is_event))
     for one in tried:
         found.tried.setdefault(one.candidate.label, one)
-    useful = [one for one in tried if one.is_event or _is_useful(found, one.gain)]
+    useful = [one for one in tried if one.is_event or _is_useful(found, one)]
     useful = _sure(useful, train, is_measured)
     if not useful:
         return False
@@ -152,7 +151,7 @@ def _round(
     begun = go_down(best.fit, train)  # with the derivative that it has
     fit = polish(best.fit.space, begun.z, train, 4, enough=1e-4)
     final = _tried(found, best.screened, fit, best.is_event)
-    if final.gain.loss <= best.gain.loss and (best.is_event or _is_useful(found, final.gain)):
+    if final.gain.loss <= best.gain.loss and (best.is_event or _is_useful(found, final)):
         best = final
     best, rivals, family = _elsewhere(found, best, rivals, train, test, progress)
     found.accepted.append(best)
@@ -245,13 +244,19 @@ def _usually(losses: Float64) -> float:
     return STANDS_OUT * max(float(np.median(losses)), 1.0)
 
 
-def _is_useful(found: Search, gain: Gain) -> bool:
-    """Return whether a cause passes, beside what was named before it if anything was."""
-    if not gain.is_useful(float(found.base_losses.mean())):
+def _is_useful(found: Search, one: Tried) -> bool:
+    """Return whether a cause passes, beside what was named before it if anything was.
+
+    Of a payload or a link's inertia what is held out cannot tell that, see ``foretold.py``.
+    """
+    if not one.gain.is_useful(float(found.base_losses.mean())):
         return False
     if not found.accepted or not found.problem.noise.is_white:
         return True
-    return gain.apart is not None and gain.apart.gain >= _BESIDE * gain.apart.before
+    if one.foretold is not None and not one.foretold.is_told:
+        return True
+    apart = one.gain.apart
+    return apart is not None and apart.gain >= _BESIDE * apart.before
 
 
 def _sure(useful: list[Tried], train: tuple[int, ...], is_measured: bool) -> list[Tried]:

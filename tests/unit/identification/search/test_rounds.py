@@ -1,5 +1,6 @@
 """What is taken of several causes that pass, and a search as a whole."""
 
+import copy
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -31,6 +32,7 @@ from shared.identification.hidden.recipe import Recipe, wish_of
 from shared.identification.progress import silent
 from shared.identification.search.rounds import (
     _is_rival,  # pyright: ignore[reportPrivateUsage]
+    _is_useful,  # pyright: ignore[reportPrivateUsage]
     _simplest,  # pyright: ignore[reportPrivateUsage]
     _sure,  # pyright: ignore[reportPrivateUsage]
     search,
@@ -145,6 +147,29 @@ def test_where_noise_was_not_measured_what_may_as_well_be_nothing_is_never_taken
     assert not _sure([unsure], train, False)
     (kept,) = _sure([unsure, sure], train, False)
     assert kept is sure
+
+
+@pytest.mark.parametrize(
+    ("takes", "kept", "beside"),
+    [(0.05, 0.5, True), (0.01, 0.5, False), (None, 0.5, False), (0.01, 0.05, True)],
+    ids=["plain", "slight", "not followed", "a link's, which cannot show there"],
+)
+def test_beside_a_cause_held_out_motion_must_follow_another_plainly(
+    searches: Searches, takes: float | None, kept: float, beside: bool
+):
+    first = searches.tried(DRAG, _BAD, _GOOD + 2.0)
+    other = searches.tried(ELBOW, _GOOD + 2.0, _GOOD)
+    apart = None if takes is None else Taken(1.0, takes)
+    gain = replace(other.gain, is_measured=True, apart=apart)
+    other = replace(other, gain=gain, foretold=Foretold(9.0, 0.9, kept))
+    alone, after = searches.search(_BAD), searches.search(_BAD, first)
+    for found in (alone, after):
+        found.problem = copy.copy(found.problem)
+        found.problem.noise = replace(found.problem.noise, is_measured=True, memory=np.eye(1))
+    assert _is_useful(alone, other)
+    assert _is_useful(after, other) is beside
+    after.problem.noise = replace(after.problem.noise, memory=None)
+    assert _is_useful(after, other)  # nobody knows what is new in noise
 
 
 def test_turns_so_short_that_they_are_a_delay_are_a_rival_of_it(searches: Searches):
