@@ -78,9 +78,9 @@ def arms_of(name: str) -> tuple[ArmName, ...]:
     return tuple(arm for arm in _ARMS if arm in able) or able
 
 
-def _names() -> tuple[str, ...]:
-    """Return what can be hidden, in the order of the seeds."""
-    return (*(name for name in hidden_effects() if name not in _LATER), *_LATER)
+def _first() -> tuple[str, ...]:
+    """Return what could be hidden when the protocol began, in the order of the seeds."""
+    return tuple(name for name in hidden_effects() if name not in _LATER)
 
 
 def _scene(arm: ArmName) -> Scene:
@@ -88,7 +88,7 @@ def _scene(arm: ArmName) -> Scene:
 
 
 def _single(count: int) -> Iterator[Trial]:
-    for number, name in enumerate(_names()):
+    for number, name in enumerate((*_first(), *_LATER)):
         arms = arms_of(name)
         for turn in range(count):
             seed = FIRST_SEED + 100 * number + turn
@@ -111,7 +111,7 @@ def _two(count: int) -> Iterator[Trial]:
 
 
 def _outside(count: int) -> Iterator[Trial]:
-    names = tuple(name for name in _names() if name not in _LATER)
+    names = _first()
     for turn in range(count):
         name = names[turn % len(names)]
         arms = arms_of(name)

@@ -21,12 +21,11 @@ from studies.real_data.folders import hashes_of, there, write
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
 TRAIN = ("prbs_excitation", "multisine", "chirp_sweep")
 TEST = ("coupled_joints", "frequency_sweep")
-_SERVO = 'damping="0.6" frictionloss="0.052" armature="0.028"'
 _MODEL = """<mujoco model="so101">
   <compiler angle="radian"/>
   <option timestep="0.002"/>
   <default>
-    <joint axis="0 0 1" {servo}/>
+    <joint axis="0 0 1" damping="0.6" frictionloss="0.052" armature="0.028"/>
     <position kp="17.8" forcerange="-2.94 2.94"/>
   </default>
   <worldbody>
@@ -69,12 +68,6 @@ _MODEL = """<mujoco model="so101">
 """
 
 
-def model() -> str:
-    """Return the MJCF."""
-    servos = "".join(f'\n    <position name="{name}" joint="{name}"/>' for name in JOINTS)
-    return _MODEL.format(servo=_SERVO, servos=servos)
-
-
 def convert(
     out: Path, raw: Path, seconds: float = 11.0,
     train: Sequence[str] = TRAIN, test: Sequence[str] = TEST,
@@ -95,7 +88,8 @@ def convert(
         files |= {f"{name}/{told.name}": told, f"{name}/{logged.name}": logged}
         trajectories.append(_recording(name, split, _table(told), _table(logged), seconds))
     notes = {"source": "github.com/isaac-sim2real/sage", "sha256": hashes_of(files)}
-    write(out, model(), "position", JOINTS, tuple(trajectories), notes)
+    servos = "".join(f'\n    <position name="{name}" joint="{name}"/>' for name in JOINTS)
+    write(out, _MODEL.format(servos=servos), "position", JOINTS, tuple(trajectories), notes)
 
 
 def _recording(

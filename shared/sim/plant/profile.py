@@ -3,7 +3,7 @@
 import numpy as np
 
 from shared.sim.arm import Float64
-from shared.sim.plant.signals import Signal
+from shared.sim.plant.signals import Signal, held_spans
 
 
 def ramped(
@@ -25,14 +25,13 @@ def ramped(
     count = max(int((until - first) / period) + 2, 2)
     at: Float64 = first + period * np.arange(count, dtype=np.float64)
     targets = signal.held(at)
-    changes = np.flatnonzero(np.any(np.diff(targets, axis=0) != 0.0, axis=1)) + 1
     out = np.empty_like(targets)
-    here, place, speed = 0, targets[0], np.zeros(targets.shape[1])
-    for end in [*changes.tolist(), count]:
+    place, speed = targets[0], np.zeros(targets.shape[1])
+    for here, end in held_spans(targets):
         middles: Float64 = period * (0.5 + np.arange(end - here, dtype=np.float64))
         times = np.r_[middles, period * (end - here)]
         found, speed = _ramp(place, speed, targets[here], acceleration, times)
-        out[here:end], place, here = found[:-1], found[-1], end
+        out[here:end], place = found[:-1], found[-1]
     return Signal(np.r_[signal.at[0], at], np.concatenate([signal.values[:1], out]))
 
 

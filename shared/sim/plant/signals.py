@@ -1,6 +1,7 @@
 """Signals over time: a command as a controller gets it, a pose as a tracker sees it."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -57,15 +58,23 @@ def filtered(signal: Signal, share: float, until: float) -> Signal:
         return signal
     at: Float64 = CYCLE * np.arange(int(until / CYCLE) + 2, dtype=np.float64)
     targets = signal.held(at)
-    changes = np.flatnonzero(np.any(np.diff(targets, axis=0) != 0.0, axis=1)) + 1
     out = np.empty_like(targets)
-    begin, pose = 0, targets[0]
-    for end in [*changes.tolist(), len(at)]:
+    pose = targets[0]
+    for begin, end in held_spans(targets):
         cycles: Float64 = np.arange(1, end - begin + 1, dtype=np.float64)
         covered: Float64 = 1.0 - (1.0 - share) ** cycles
         out[begin:end] = _between(pose, targets[begin], covered)
-        begin, pose = end, out[end - 1]
+        pose = out[end - 1]
     return Signal(at, out)
+
+
+def held_spans(values: Float64) -> list[tuple[int, int]]:
+    """Return begin and end of the rows of float64[T, U] that are the same, one span after another.
+
+    The end is the first row that is not in the span.
+    """
+    changes = np.flatnonzero(np.any(np.diff(values, axis=0) != 0.0, axis=1)) + 1
+    return list(pairwise([0, *changes.tolist(), len(values)]))
 
 
 def _between(start: Float64, end: Float64, shares: Float64) -> Float64:
