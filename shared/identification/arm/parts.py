@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shared.identification.arm.smoothing import smooth
+from shared.identification.arm.smoothing import smooth_states
 from shared.identification.dataset.types import Float64, Trajectory
 from shared.sim.plant.plant import Control
 from shared.sim.plant.rollouts import Recorded
@@ -63,7 +63,7 @@ def states_of(
     even, period = _even(trajectory), _period(trajectory)
     q = sampled(trajectory.joints_at, trajectory.q, even)
     width = width_of(period, cut)
-    position, speed = smooth(q, width), smooth(q, width, period)
+    position, speed = smooth_states(q, width, period)
     # MuJoCo's Euler step takes the position with the speed after it: it is of second order if the
     # speed is given half a step before the position (Stormer and Verlet's method).
     before = sampled(even, speed, instants - 0.5 * timestep)
