@@ -44,7 +44,8 @@ _ROUNDS = 4
 _FULL = 4
 """Candidates that get a full fit, of those refitted roughly."""
 _FAR_OFF = 10.0
-"""Mean square residual, in noise floors, from which the base may be bent out of sight."""
+"""Mean square residual, in noise floors, of what was fitted to or held out, from which the base may
+be bent out of sight."""
 _FAR = 2.0
 """Candidates whose rough refit costs so many times the best one's get no full fit."""
 QUIET = 1.25
@@ -122,9 +123,10 @@ def _round(
     if not left:
         return False
     is_measured = found.problem.noise.is_measured
-    is_far = not is_measured or float(found.current_losses.mean()) > _FAR_OFF
     now = found.current.variant
     before = plain_stretches(found.problem, now, train)
+    is_off = max(float(found.current_losses.mean()), float(before.mean())) > _FAR_OFF
+    is_far = not is_measured or is_off
     is_calm = float(before.max()) <= _usually(before)
     screened, roughly = look(
         found.parts, found.nominal, left, is_far, progress, is_calm, hopeless(found), found.seen
