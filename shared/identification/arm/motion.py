@@ -39,11 +39,17 @@ def motion_of(trajectory: Trajectory) -> Motion:
     return smooth_motion(trajectory.joints_at, trajectory.q)
 
 
-def smooth_motion(at: Float64, readings: Float64) -> Motion:
-    """Return the motion of positions float64[T, J] at instants float64[T], as :func:`motion_of`."""
+def smooth_motion(at: Float64, readings: Float64, width: float = _SMOOTH) -> Motion:
+    """Return the motion of positions, as :func:`motion_of`.
+
+    Args:
+        at: float64[T], instants (s).
+        readings: float64[T, J] (rad, m).
+        width: of what a speed is taken from, either side together (s).
+    """
     period = max(_PERIOD, float(np.median(np.diff(at))))
     even: Float64 = np.arange(float(at[0]), float(at[-1]), period, dtype=np.float64)
-    half = max(round(_SMOOTH / period / 2.0), 2)
+    half = max(round(width / period / 2.0), 2)
     if len(even) <= 2 * half:
         still = np.zeros_like(readings)
         return Motion(readings, still, still, at)

@@ -9,7 +9,7 @@ from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
 from shared.identification.laws.series import link_inertia, seen_by_tracker, series
-from shared.sim.plant.row import At, Row
+from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure, series_name
 
 _PART = "gap"
@@ -42,7 +42,7 @@ class Backlash:
         return series(subject, place, _PART)
 
     def enter(self, row: Row, place: str, values: Float64) -> None:
-        """Open the gap; the link starts where a tracker sees it, or else on the loaded flank."""
+        """Open the gap; the link starts as a tracker sees it, or else on the loaded flank."""
         half = 0.5 * float(values[0])
         if half <= 0.0:
             return
@@ -62,7 +62,9 @@ class Backlash:
         if seen is None:
             row.rest(name, _Flank(half))
         else:  # where the load is near zero, it does not say on which flank the link lies
-            row.rest(name, At(float(np.clip(seen, -half, half))))
+            is_free = abs(seen.place) < half
+            begins = float(np.clip(seen.place, -half, half))
+            row.start(name, begins, seen.speed if is_free else 0.0)
 
 
 @dataclass(frozen=True)

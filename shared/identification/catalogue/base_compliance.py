@@ -12,6 +12,8 @@ from shared.sim.plant.structure import Builder, Edit, Structure
 
 _RINGING = 0.1
 """A twentieth of critical with 1 kg m^2 of arm (sqrt(kg) m)."""
+_SWING = 0.1
+"""What the arm's speeds are taken from, for how it sways when a part begins (s)."""
 
 _SOFT = (0.3, 1.0, 3.0, 8.0)
 """Times the probe: what is softer also sways more slowly."""
@@ -62,7 +64,7 @@ class BaseCompliance:
         for axis, compliance in zip(axes, compliances, strict=True):
             row.spring(_joint(axis), compliance, ringing)
         if any(compliances):
-            start_swaying(row, [_joint(axis) for axis in axes])
+            start_swaying(row, [_joint(axis) for axis in axes], _SWING)
 
 
 def _joint(axis: str) -> str:

@@ -7,12 +7,15 @@ from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
 from shared.identification.laws.series import link_inertia, series
+from shared.identification.laws.sway import start_swaying
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure, series_name
 
 _PART = "series"
 _DAMPING = 0.03
 """Of critical: what steel and bolted joints lose."""
+_SWING = 0.06
+"""What the arm's speeds are taken from, for how the link swings when a part begins (s)."""
 
 
 class JointElasticity:
@@ -39,13 +42,14 @@ class JointElasticity:
         return series(subject, place, _PART)
 
     def enter(self, row: Row, place: str, values: Float64) -> None:
-        """Set the spring."""
+        """Set the spring, swung by what the joint did before."""
         compliance = float(values[0])
         name = series_name(row.plant, place, _PART)
         inertia = link_inertia(row, row.mj_joint(name))
         row.spring(name, compliance, ringing=2.0 * _DAMPING * math.sqrt(inertia))
         if compliance:
             row.trust_encoders()
+            start_swaying(row, [name], _SWING)
 
 
 EFFECT = JointElasticity()

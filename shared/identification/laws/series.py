@@ -5,6 +5,7 @@ is the load: what the link takes of gravity and inertia.
 """
 
 import functools
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,8 +22,8 @@ _LEVER = 0.5
 """What a tracker's turn counts beside its way: a bat's length (m)."""
 _KEPT = 512
 """Recordings, or parts of them, of which it is kept where the link was."""
-_FEWEST = 5
-"""Readings that it takes to say so."""
+_FEWEST = 4
+"""Readings that it takes to say so; before the start and after it, to say how it moves."""
 
 
 def series(subject: Subject, label: str, part: str) -> Structure:
@@ -40,14 +41,23 @@ def link_inertia(row: Row, joint: int) -> float:
     return float(row.model.dof_M0[dof] - row.model.dof_armature[dof])
 
 
-def seen_by_tracker(row: Row, label: str) -> float | None:
-    """Return how far a link is off its motor at the start, as a tracker saw it; None without one.
+class Seen(NamedTuple):
+    """Where a link is beside its motor, as a tracker sees it."""
+
+    place: float
+    """(rad, m)."""
+    speed: float
+    """(rad/s, m/s)."""
+
+
+def seen_by_tracker(row: Row, label: str) -> Seen | None:
+    """Return where a link is beside its motor at the start, as a tracker saw it; None without one.
 
     It is the turn of the joint that brings the tool from where the encoders have it to where it
-    was seen, as well as a turn can (least squares).
+    was seen, as well as a turn can (least squares), and by how much it changes.
 
     Args:
-        row: the arm.
+        row: the arm; what begins with its recording begins at rest.
         label: the logged joint.
     """
     if row.logged_tracker is None:
@@ -57,8 +67,8 @@ def seen_by_tracker(row: Row, label: str) -> float | None:
 
 
 @functools.lru_cache(_KEPT)
-def _turn(plant: Plant, model: Model, log: Signal, tracker: Signal, joint: int) -> float | None:
-    """Return the turn of a joint that a tracker saw and its encoder did not (rad, m)."""
+def _turn(plant: Plant, model: Model, log: Signal, tracker: Signal, joint: int) -> Seen | None:
+    """Return the turn of a joint that a tracker saw and its encoder did not."""
     is_near = np.abs(tracker.at) <= _AROUND
     if np.count_nonzero(is_near) < _FEWEST:
         return None
@@ -67,4 +77,8 @@ def _turn(plant: Plant, model: Model, log: Signal, tracker: Signal, joint: int) 
     units = np.array([1.0, 1.0, 1.0, _LEVER, _LEVER, _LEVER])
     column = jacobian[:, :, joint] * units
     off = pose_error(tracker.values[is_near], poses) * units
-    return float(np.sum(column * off) / max(np.sum(column**2), 1e-9))
+    is_moving = np.count_nonzero(at < 0.0) >= _FEWEST <= np.count_nonzero(at >= 0.0)
+    powers = np.stack([np.ones_like(at), at] if is_moving else [np.ones_like(at)])
+    moved = column * powers[:, :, None]
+    found = np.linalg.lstsq(moved.reshape(len(powers), -1).T, off.ravel(), rcond=None)[0]
+    return Seen(float(found[0]), float(found[1]) if is_moving else 0.0)

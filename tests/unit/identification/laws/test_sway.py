@@ -1,12 +1,16 @@
-"""A part of a recording begins with what the arm stands on as its motion before left it."""
+"""A part of a recording begins with what no encoder sees as the motion before left it."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from shared.identification.catalogue.backlash import EFFECT as PLAYS
 from shared.identification.catalogue.base_compliance import EFFECT as GIVES
+from shared.identification.catalogue.joint_elasticity import EFFECT as BENDS
 from shared.identification.dataset.types import Float64
+from shared.identification.effect import Effect
 from shared.sim.plant.rollouts import Recorded, Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal, pose_error
@@ -82,3 +86,34 @@ def test_too_short_a_motion_says_nothing(
     asked, q, _ = whole
     short = replace(part(asked, q), logged_q=Signal(asked.joints_at[:5] - 0.04, q[:5]))
     assert rollouts.entered(gives, short).speeds == {}
+
+
+@pytest.mark.parametrize("effect", [BENDS, PLAYS])
+def test_a_link_behind_its_gear_begins_as_the_motion_before_left_it(
+    tmp_path: Path, effect: Effect
+) -> None:
+    """Where it is soft, or free in a gap, its speed counts."""
+    subject = make_subject(make_plant(tmp_path))
+    rollouts = Rollouts(subject.plant, effect.structure(subject, "pan"), 2)
+    size = {"joint_elasticity": 0.05, "backlash": 0.15}[effect.name]
+
+    def loose(row: Row) -> None:
+        effect.enter(row, "pan", np.array([size]))
+
+    asked = recorded(swing, seconds=3.0)
+    (whole,) = rollouts.run([(loose, asked)])
+    assert whole.tracker is not None
+    assert asked.tracker_at is not None
+    later = part(asked, whole.q)
+    seen = Signal(asked.tracker_at - later.begin, whole.tracker)
+    true = whole.tracker[-len(later.joints_at) :]
+
+    def off(recording: Recorded) -> float:
+        (found,) = rollouts.run([(loose, recording)])
+        assert found.tracker is not None
+        return float(np.sqrt(np.mean(pose_error(true, found.tracker)[:30, :3] ** 2)))
+
+    as_it_was = off(replace(later, logged_tracker=seen))
+    at_rest = off(replace(later, begin=0.0))
+    assert at_rest > 1e-3
+    assert as_it_was < 0.3 * at_rest
