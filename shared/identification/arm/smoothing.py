@@ -11,9 +11,10 @@ from shared.identification.dataset.types import Float64
 
 _USUAL, _MORE = 3, 5
 """Degrees of the polynomials."""
-_BENT = 15.0
+_BENT = 60.0
 """Variances of the readings by which two more terms of a polynomial leave less, that speak for
-them: noise has so much in one window of two thousand (chi-square with two degrees of freedom)."""
+them. Noise has 15 in one window of two thousand (chi-square with two degrees of freedom), but where
+a joint begins to slide its speed has a kink, which a higher degree follows worse."""
 
 
 def smooth(values: Float64, width: int, period: float | None = None) -> Float64:
