@@ -51,6 +51,9 @@ class Least(NamedTuple):
 BY_LOSS = Least(at_all=0.04, beside=0.005, noise=1.0)
 """Beside others, since no law is quite the arm's, and one that is off by 7 % of what it does leaves
 so much for another to make up for."""
+FAR_FROM_LINKS = BY_LOSS._replace(at_all=0.02)
+"""The same of a cause that links could make up for on what was held out, but not on what was fitted
+to, near what is known of them."""
 BY_FOLLOWING = Least(at_all=0.001, beside=0.001, noise=FLOOR)
 """Of a cause that what was held out follows, see ``foretold.py``: it is sure, so small as it is."""
 
@@ -95,6 +98,9 @@ class Gain:
     """Where what was held out surely follows what the cause foretells: what it takes off there,
     without what the base could make up for. The loss itself has in it what the recordings that were
     fitted to do not show of the base."""
+    is_far_from_links: bool = False
+    """Whether of what was fitted to links could surely not make up for it, near what is known of
+    them, as they could of what was held out."""
 
     @property
     def gain(self) -> float:
@@ -119,7 +125,8 @@ class Gain:
         """Return in which ways it is surely better, and by enough."""
         ways: list[tuple[Taken, Least]] = []
         if self.surely > 0.0:
-            ways.append((Taken(self.before, self.gain), BY_LOSS))
+            least = FAR_FROM_LINKS if self.is_far_from_links else BY_LOSS
+            ways.append((Taken(self.before, self.gain), least))
         if self.apart is not None:
             ways.append((self.apart, BY_FOLLOWING))
         return [(taken, least) for taken, least in ways if taken.is_enough(least, self.is_measured)]

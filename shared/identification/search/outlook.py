@@ -2,8 +2,8 @@
 
 Where little more than noise is left, every candidate is small, and what the screen expects of it is
 about where a refit ends. So what was held out can be asked before: a candidate that it does not
-follow at all, and whose expected size takes nothing off its loss, is not refitted. That only leaves
-candidates out; what passes is judged as ever.
+follow at all, though it could, and whose expected size takes nothing off its loss, is not refitted.
+That only leaves candidates out; what passes is judged as ever.
 """
 
 from collections.abc import Callable
@@ -18,6 +18,9 @@ _SMALL = 0.02
 """Share of the training residual up to which what the screen expects is about what comes."""
 _FOLLOWED = 1.0
 """Standard errors by which held-out residuals follow what has a prospect; 1.65 are to pass."""
+_BEYOND_LINKS = 20.0
+"""Of the cost, that a cause may take off which links could make up for on what was held out, so
+that this cannot say if it is there; 100 are to pass, but a screen sees less of it than a refit."""
 _GAINS = 0.01
 """Of the held-out loss, that has a prospect all the same; 0.04 at least are to pass."""
 
@@ -48,4 +51,6 @@ def _is_hopeless(found: Search, one: Screened) -> bool:
         return False
     # What the base makes up for is taken out there: it need not go along.
     alone = space.variant(space.clip(np.r_[current.z, one.start]))
-    return held_of(found, current).follow(current.variant, alone).errors < _FOLLOWED
+    foretold = held_of(found, current).follow(current.variant, alone)
+    is_told = foretold.is_told or one.share * found.parts.cost < _BEYOND_LINKS
+    return is_told and foretold.errors < _FOLLOWED

@@ -50,6 +50,8 @@ _FAR = 2.0
 """Candidates whose rough refit costs so many times the best one's get no full fit."""
 QUIET = 1.25
 """Mean square residual, in noise floors, below which no further cause is looked for."""
+_AFRESH = 4
+"""Derivatives of a second fit of what links could make up for."""
 _EVENT = 4.0
 """Times the mean square residual of the usual stretch that one counts with at most, between causes:
 what happened once would be most of the mean, and most of its error."""
@@ -141,7 +143,9 @@ def _round(
         space = Space(found.problem, each.space.candidates)
         fit = settle(space, each.z, train, found.current)
         is_event = _explains_event(each.screened.candidate, before, fit, train)
-        tried.append(_tried(found, each.screened, fit, is_event))
+        one = _tried(found, each.screened, fit, is_event)
+        is_hidden = not one.is_told and one.gain.gain > 0.0
+        tried.append(_begun_anew(found, one, train) if is_hidden else one)
     for one in tried:
         found.tried.setdefault(one.candidate.label, one)
     useful = [one for one in tried if one.is_event or _is_useful(found, one)]
@@ -169,6 +173,19 @@ def _round(
         space = Space(found.parts.space.problem, found.current.space.candidates)
         found.parts = polish(space, found.current.z, space.problem.of("train"), 2)
     return True
+
+
+def _begun_anew(found: Search, one: Tried, train: tuple[int, ...]) -> Tried:
+    """Return a cause that links could make up for, fitted from where it was seen, if better.
+
+    Links and it go together in a valley that is nearly flat, where a rough refit may have left the
+    base anywhere.
+    """
+    start = np.r_[found.current.z, one.screened.start]
+    fit = polish(one.fit.space, start, train, _AFRESH)
+    if fit.cost >= one.fit.cost:
+        return one
+    return _tried(found, one.screened, fit, one.is_event)
 
 
 def _tried(found: Search, screened: Screened, fit: Fit, is_event: bool) -> Tried:
@@ -255,7 +272,7 @@ def _is_useful(found: Search, one: Tried) -> bool:
         return False
     if not found.accepted or not found.problem.noise.is_white:
         return True
-    if one.foretold is not None and not one.foretold.is_told:
+    if not one.is_told:
         return True
     apart = one.gain.apart
     return apart is not None and apart.gain >= _BESIDE * apart.before

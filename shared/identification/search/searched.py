@@ -33,6 +33,9 @@ TAKEN_AWAY = 0.4
 """Share of it that may be left by what explains it."""
 
 
+_NO_LINKS = 100.0
+"""Of the cost, that links cannot make up for: where theirs are 10 % off, the best of all candidates
+takes off some 30."""
 _PLAINLY, _PLAINLY_EACH = 20.0, 4.0
 """Twice what a cause takes off the cost, at least, and more for each of its numbers: of a hundred
 candidates where there is none, the best takes off some 15."""
@@ -60,6 +63,11 @@ class Tried:
     def candidate(self) -> Candidate:
         """Return which."""
         return self.screened.candidate
+
+    @property
+    def is_told(self) -> bool:
+        """Return whether what was held out could tell it from links and the base."""
+        return self.foretold is None or self.foretold.is_told
 
     def held(self, is_apart: bool = False) -> Float64:
         """Return float64[S], what it leaves of what was held out.
@@ -303,6 +311,7 @@ def judged(found: Search, candidate: Candidate, before: Model, after: Model) -> 
         surely=surely,
         is_measured=found.problem.noise.is_measured,
         apart=_apart(found, candidate, after.fit, foretold),
+        is_far_from_links=_is_far_from_links(before.fit, after.fit, foretold),
     )
     return Judged(gain, more.after, foretold)
 
@@ -312,6 +321,17 @@ def _foretold(found: Search, before: Fit, after: Fit) -> Foretold | None:
     if not _is_fitted(before, after):
         return None
     return held_of(found, before).follow(before.variant, after.variant)
+
+
+def _is_far_from_links(before: Fit, after: Fit, foretold: Foretold | None) -> bool:
+    """Return whether recordings that were fitted to say of a cause that it is no link's error.
+
+    What is known of links is part of the cost there. Of what was held out links may make up for
+    anything that they could.
+    """
+    if foretold is None or foretold.is_told:
+        return False
+    return before.cost - after.cost >= _NO_LINKS
 
 
 def _apart(

@@ -48,6 +48,17 @@ def test_a_cause_is_useful_only_if_it_is_sure_and_enough():
     assert not gain(100.0, 99.0, 0.5).is_useful(10.0)  # 1 % of what is left
 
 
+@pytest.mark.parametrize(("share", "is_enough"), [(0.05, True), (0.03, False)])
+def test_a_small_cause_passes_by_its_loss_where_links_cannot_make_up_for_it(
+    share: float, is_enough: bool
+):
+    found = Gain(1.05 * (1.0 - share), 1.05, 0.0, 0.0, 0.01, 0.01, is_measured=True)
+    assert found.is_useful(1.05) == is_enough
+    assert replace(found, is_far_from_links=True).is_useful(1.05)
+    assert not replace(found, is_far_from_links=True, surely=-0.01).is_useful(1.05)
+    assert not replace(found, is_far_from_links=True, loss=1.04).is_useful(1.05)
+
+
 def test_beside_a_far_larger_cause_a_quarter_of_what_noise_does_not_account_for_is_of_use():
     def gain(before: float, loss: float, is_measured: bool) -> Gain:
         return Gain(loss, before, 0.0, 0.0, 0.2, 0.1, is_measured)

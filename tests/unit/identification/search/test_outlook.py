@@ -59,6 +59,14 @@ def test_where_nothing_is_hidden_hardly_anything_has_a_prospect():
     assert sum(is_hopeless(each) for each in seen(nothing).values()) >= 3
 
 
+def test_what_links_could_make_up_for_there_is_refitted_if_it_may_be_much():
+    nothing = begun("")
+    torque = seen(nothing)[Candidate(BIAS, "shoulder")]
+    is_hopeless = hopeless(nothing)
+    assert is_hopeless(torque)
+    assert not is_hopeless(replace(torque, share=0.019))
+
+
 def test_only_what_is_small_and_acts_all_the_time_is_left_out(small: Search):
     yaw, is_hopeless = seen(small)[YAW], hopeless(small)
     assert not is_hopeless(replace(yaw, share=0.05))

@@ -24,6 +24,7 @@ from shared.identification.catalogue.torque_gain import EFFECT as GAIN
 from shared.identification.dataset.types import Dataset, Float64
 from shared.identification.effect import Candidate
 from shared.identification.find import identify
+from shared.identification.fitting.fit import Fit
 from shared.identification.gate.certainty import SURE, sureness
 from shared.identification.gate.foretold import Foretold
 from shared.identification.gate.held_out import Taken
@@ -31,6 +32,7 @@ from shared.identification.hidden.generator import hide
 from shared.identification.hidden.recipe import Recipe, wish_of
 from shared.identification.progress import silent
 from shared.identification.search.rounds import (
+    _begun_anew,  # pyright: ignore[reportPrivateUsage]
     _is_rival,  # pyright: ignore[reportPrivateUsage]
     _is_useful,  # pyright: ignore[reportPrivateUsage]
     _simplest,  # pyright: ignore[reportPrivateUsage]
@@ -108,6 +110,16 @@ def test_what_happened_once_has_no_large_say_in_which_cause_does_best(searches: 
     wrong = replace(searches.tried(LIFT, _BAD, _GOOD + 0.3), fitted=fitted + 0.2 + 0.8 * event)
     assert wrong.everywhere().mean() < right.everywhere().mean()
     assert _simplest([wrong, right], rng) == (right, ())
+
+
+def test_what_links_could_make_up_for_is_fitted_anew_from_where_it_was_seen(searches: Searches):
+    found, train = searches.search(np.full(4, 10.0)), searches.problem.of("train")
+    one = searches.tried(ELBOW, _BAD, _GOOD)
+    astray = one.fit.z + 0.3
+    stuck = replace(one, fit=Fit.at(one.fit.space, one.fit.space.clip(astray), train))
+    anew = _begun_anew(found, stuck, train)
+    assert anew.fit.cost < 0.7 * stuck.fit.cost
+    assert _begun_anew(found, anew, train) is anew
 
 
 def test_a_cause_that_may_as_well_be_nothing_is_taken_only_if_all_may(searches: Searches):
