@@ -70,9 +70,13 @@ one is by so much by chance once in twenty times (Bonferroni)."""
 _BESIDE = 0.02
 """Of the noise: what is held out must follow a cause beside others by so much. No law is quite the
 arm's, and what a named one leaves of what it did is surely there, too, and looks like others."""
-_LEANS = {"encoder_offset", "payload"}
-"""A tool that is heavy beside its middle hangs as one does at a joint of which the encoder has
-another zero; what a payload's shape adds to that is not modelled."""
+_STANDS_OFF = {
+    frozenset({"encoder_offset", "payload"}): ALIKE,
+    frozenset({"encoder_offset", "backlash"}): 0.1,
+}
+"""Pairs that are a joint with another zero, near enough, and the share of the gain within which: a
+tool that is heavy beside its middle, of which the shape is not modelled, and a gear with play that
+its load never turns round, of which flanks give and links bounce as no model says."""
 
 
 def search(found: Search, progress: Progress) -> None:
@@ -329,11 +333,11 @@ def _is_nearly(taken: Tried, other: Tried, is_apart: bool, rng: np.random.Genera
     Both of the recordings that were fitted to and of those that were held out.
     """
     name, of_taken = other.candidate.effect.name, taken.candidate.effect.name
-    leans = {name, of_taken} == _LEANS
-    if not leans and LATE.get(name) != of_taken and not {name, of_taken} <= _LOADS:
+    share = _STANDS_OFF.get(frozenset({name, of_taken}), 0.0)
+    if not share and LATE.get(name) != of_taken and not {name, of_taken} <= _LOADS:
         return False
     margin = compare(other.held(is_apart), taken.held(is_apart), rng)
-    least = max(margin.error, ALIKE * taken.gain.gain if leans else 0.0)
+    least = max(margin.error, share * taken.gain.gain)
     return margin.gain < least and other.fit.cost <= (1 + _NEARLY) * taken.fit.cost
 
 

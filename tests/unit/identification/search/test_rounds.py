@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from shared.identification.catalogue.backlash import EFFECT as PLAY
 from shared.identification.catalogue.command_latency import EFFECT as LATE
 from shared.identification.catalogue.counterbalance import EFFECT as BALANCE
 from shared.identification.catalogue.encoder_offset import EFFECT as ZERO
@@ -232,6 +233,18 @@ def test_a_payload_beside_the_centre_and_an_encoders_zero_are_rivals_if_a_little
     assert _simplest([heavy, zero], np.random.default_rng(0)) == (zero, (heavy,))
     further = replace(heavy, losses=_GOOD + 5.0 * apart)
     assert _simplest([further, zero], np.random.default_rng(0)) == (zero, ())
+
+
+@pytest.mark.parametrize(("apart", "are_rivals"), [(0.07, True), (0.15, False)])
+def test_play_under_a_load_that_does_not_turn_round_and_an_encoders_zero_are_rivals(
+    searches: Searches, apart: float, are_rivals: bool
+):
+    zero = searches.tried(Candidate(ZERO, "elbow"), _BAD, _GOOD)
+    worse = _GOOD + apart * float((_BAD - _GOOD).mean())
+    play = searches.tried(Candidate(PLAY, "elbow"), _BAD, worse)
+    play = replace(play, fit=replace(play.fit, cost=zero.fit.cost))
+    expected = (play,) if are_rivals else ()
+    assert _simplest([play, zero], np.random.default_rng(0)) == (zero, expected)
 
 
 def test_of_causes_that_are_followed_the_best_is_told_without_what_the_base_could_do(
