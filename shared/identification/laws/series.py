@@ -22,8 +22,10 @@ _LEVER = 0.5
 """What a tracker's turn counts beside its way: a bat's length (m)."""
 _KEPT = 512
 """Recordings, or parts of them, of which it is kept where the link was."""
-_FEWEST = 4
-"""Readings that it takes to say so; before the start and after it, to say how it moves."""
+_FEWEST = 5
+"""Readings that it takes to say so."""
+_EITHER_SIDE = 4
+"""Of these, before the start and after it, that it takes to say how it moves."""
 
 
 def series(subject: Subject, label: str, part: str) -> Structure:
@@ -77,7 +79,8 @@ def _turn(plant: Plant, model: Model, log: Signal, tracker: Signal, joint: int) 
     units = np.array([1.0, 1.0, 1.0, _LEVER, _LEVER, _LEVER])
     column = jacobian[:, :, joint] * units
     off = pose_error(tracker.values[is_near], poses) * units
-    is_moving = np.count_nonzero(at < 0.0) >= _FEWEST <= np.count_nonzero(at >= 0.0)
+    earlier = np.count_nonzero(at < 0.0)
+    is_moving = min(earlier, len(at) - earlier) >= _EITHER_SIDE
     powers = np.stack([np.ones_like(at), at] if is_moving else [np.ones_like(at)])
     moved = column * powers[:, :, None]
     found = np.linalg.lstsq(moved.reshape(len(powers), -1).T, off.ravel(), rcond=None)[0]

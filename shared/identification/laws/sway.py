@@ -42,7 +42,9 @@ class _Before:
     """float64[T, B, B] (kg m^2)."""
 
 
-_known: WeakKeyDictionary[Signal, dict[tuple[str, ...], _Before | None]] = WeakKeyDictionary()
+_Told = dict[tuple[tuple[str, ...], float], _Before | None]
+_known: WeakKeyDictionary[Signal, _Told] = WeakKeyDictionary()
+"""Of a recording's log, by joints and by what speeds are taken from."""
 
 
 def start_swaying(row: Row, names: Sequence[str], width: float) -> None:
@@ -99,7 +101,7 @@ def _swung(
 
 def _before(row: Row, names: Sequence[str], width: float) -> _Before | None:
     """Return what the arm did before time 0; None if that is too short to tell; worked out once."""
-    log, key = row.logged_q, tuple(names)
+    log, key = row.logged_q, (tuple(names), width)
     known = _known.setdefault(log, {})
     if key not in known:
         done = None

@@ -52,5 +52,5 @@ def _is_hopeless(found: Search, one: Screened) -> bool:
     # What the base makes up for is taken out there: it need not go along.
     alone = space.variant(space.clip(np.r_[current.z, one.start]))
     foretold = held_of(found, current).follow(current.variant, alone)
-    is_told = foretold.is_told or one.share * found.parts.cost < _BEYOND_LINKS
-    return is_told and foretold.errors < _FOLLOWED
+    is_slight = one.share * found.parts.cost < _BEYOND_LINKS
+    return (foretold.is_told or is_slight) and foretold.errors < _FOLLOWED
