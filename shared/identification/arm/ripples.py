@@ -20,7 +20,9 @@ FEWEST = 2.0
 MOST = 30.0
 """More ripples in a joint's travel are too short for encoders at 100 Hz."""
 KEPT = 2
-"""Frequencies a joint that are worth a simulation."""
+"""Frequencies a joint, at most, that are worth a simulation."""
+_BESIDE = 1 / 3
+"""Of the strongest one's power that another must have: a strong line leaks into all others."""
 _STEP = 0.125
 """Between frequencies that are looked at: an eighth of a ripple in the whole travel."""
 _INSTANTS = 4000
@@ -67,6 +69,8 @@ def _strongest(q: Float64, qd: Float64, qdd: Float64, torque: Float64) -> tuple[
     power = np.array([_power(left, 2.0 * np.pi * count * off) for count in counts])
     found: list[float] = []
     for index in np.argsort(-power):
+        if power[index] < _BESIDE * power.max():
+            break
         count = float(counts[index])
         if all(abs(count - other * travel) > 1.0 for other in found):
             found.append(count / travel)

@@ -25,7 +25,7 @@ from shared.identification.catalogue.torque_gain import EFFECT as GAIN
 from shared.identification.dataset.types import Dataset, Float64
 from shared.identification.effect import Candidate
 from shared.identification.find import identify
-from shared.identification.fitting.fit import Fit
+from shared.identification.fitting.fit import Fit, polish
 from shared.identification.gate.certainty import SURE, sureness
 from shared.identification.gate.foretold import Foretold
 from shared.identification.gate.held_out import Taken
@@ -121,6 +121,16 @@ def test_what_links_could_make_up_for_is_fitted_anew_from_where_it_was_seen(sear
     anew = _begun_anew(found, stuck, train)
     assert anew.fit.cost < 0.7 * stuck.fit.cost
     assert _begun_anew(found, anew, train) is anew
+
+
+def test_what_links_could_make_up_for_is_fitted_from_the_model_file_too(searches: Searches):
+    found, train = searches.search(np.full(4, 10.0)), searches.problem.of("train")
+    one = searches.tried(ELBOW, _BAD, _GOOD)
+    bent = searches.base.space.clip(searches.base.z + 50.0)
+    found.current = Fit.at(searches.base.space, bent, train)
+    alone = polish(one.fit.space, np.r_[bent, one.screened.start], train, 8)
+    anew = _begun_anew(found, replace(one, fit=alone), train)
+    assert anew.fit.cost < 0.5 * alone.cost
 
 
 def test_a_cause_that_may_as_well_be_nothing_is_taken_only_if_all_may(searches: Searches):
