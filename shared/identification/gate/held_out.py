@@ -156,7 +156,13 @@ def stretches(problem: Problem, variant: Variant, segments: tuple[int, ...]) -> 
 
 def plain_stretches(problem: Problem, variant: Variant, segments: tuple[int, ...]) -> Float64:
     """Return the same of plain residuals: how far off a model is, not how surely."""
-    return _of_all(problem, segments, problem.plain(variant, segments))
+    return plain_channels(problem, variant, segments).mean(axis=1)
+
+
+def plain_channels(problem: Problem, variant: Variant, segments: tuple[int, ...]) -> Float64:
+    """Return float64[S, C], the same of each channel."""
+    parts = zip(segments, problem.plain(variant, segments), strict=True)
+    return np.concatenate([_by_channel(problem, *each) for each in parts])
 
 
 def _of_all(problem: Problem, segments: tuple[int, ...], parts: list[Float64]) -> Float64:
@@ -166,13 +172,18 @@ def _of_all(problem: Problem, segments: tuple[int, ...], parts: list[Float64]) -
 
 def parted(problem: Problem, segment: int, residual: Float64) -> Float64:
     """Return float64[S], mean square of each stretch of one segment's residual, float64[B, C]."""
-    power = np.mean(residual**2, axis=1)
+    return _by_channel(problem, segment, residual).mean(axis=1)
+
+
+def _by_channel(problem: Problem, segment: int, residual: Float64) -> Float64:
+    """Return float64[S, C], the same of each channel."""
+    power = residual**2
     if segment in problem.uncounted:
         power = power[~problem.uncounted[segment]]
     if not len(power):
-        return np.empty(0)
+        return np.empty((0, residual.shape[1]))
     count = max(len(power) // round(STRETCH / BLOCK), 1)
-    return np.array([float(np.mean(piece)) for piece in np.array_split(power, count)])
+    return np.array([piece.mean(axis=0) for piece in np.array_split(power, count)])
 
 
 def compare(before: Float64, after: Float64, rng: np.random.Generator) -> Gain:

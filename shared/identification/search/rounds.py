@@ -14,10 +14,11 @@ from shared.identification.gate.held_out import (
     LEAST_SHARE,
     compare,
     floor_of,
-    plain_stretches,
+    plain_channels,
     stretches,
 )
 from shared.identification.progress import Progress
+from shared.identification.search.events import explains_event, is_calm
 from shared.identification.search.family import Family, look_elsewhere, relatives
 from shared.identification.search.fewer import one_for_many, prune, tell_apart
 from shared.identification.search.look import look
@@ -26,8 +27,6 @@ from shared.identification.search.screen import Screened
 from shared.identification.search.searched import (
     ALIKE,
     NEARLY_NOISE,
-    STANDS_OUT,
-    TAKEN_AWAY,
     Model,
     Search,
     Tried,
@@ -130,13 +129,13 @@ def _round(
         return False
     is_measured = found.problem.noise.is_measured
     now = found.current.variant
-    before = plain_stretches(found.problem, now, train)
+    before = plain_channels(found.problem, now, train)
     is_off = max(float(found.current_losses.mean()), float(before.mean())) > _FAR_OFF
     is_far = not is_measured or is_off
-    is_calm = float(before.max()) <= _usually(before)
     screened, roughly = look(
-        found.parts, found.nominal, left, is_far, progress, is_calm, hopeless(found), found.seen
-    )
+        found.parts, found.nominal, left, is_far, progress, is_calm(before), hopeless(found),
+        found.seen,
+    )  # fmt: skip
     for each in screened:
         found.screened.setdefault(each.candidate.label, each)
     tried: list[Tried] = []
@@ -146,7 +145,7 @@ def _round(
         progress("decide", len(tried) / _FULL, each.screened.candidate.label)
         space = Space(found.problem, each.space.candidates)
         fit = settle(space, each.z, train, found.current)
-        is_event = _explains_event(each.screened.candidate, before, fit, train)
+        is_event = explains_event(each.screened.candidate, before, fit, train)
         one = _tried(found, each.screened, fit, is_event)
         is_hidden = not one.is_told and one.gain.gain > 0.0
         tried.append(_begun_anew(found, one, train) if is_hidden else one)
@@ -235,39 +234,6 @@ def _elsewhere(
         and compare(after[one.candidate], family.losses, found.rng).surely <= 0.0
     )
     return (best, rivals, None) if left else (taken, (), family)
-
-
-def _explains_event(
-    candidate: Candidate, before: Float64, fit: Fit, train: tuple[int, ...]
-) -> bool:
-    """Return whether a cause that is in one recording takes away what stands out there.
-
-    Held-out recordings cannot show what happened once in another one. What stands out must be far
-    over everything else, more than noise that is the same throughout would ever be, and how large
-    it was has to be known.
-
-    Args:
-        candidate: the cause.
-        before: float64[S], plain losses of stretches without it, of what was fitted to.
-        fit: with it.
-        train: recordings to fit to.
-    """
-    if candidate.recording is None:
-        return False
-    after = plain_stretches(fit.space.problem, fit.variant, train)
-    worst = int(np.argmax(before - after))
-    most = _usually(before)
-    is_explained = (
-        before[worst] > most
-        and after[worst] < TAKEN_AWAY * before[worst]
-        and after.max() < max(TAKEN_AWAY * before.max(), most)
-    )
-    return bool(is_explained) and is_there(fit, candidate, train)
-
-
-def _usually(losses: Float64) -> float:
-    """Return what a stretch in which nothing happened leaves at most."""
-    return STANDS_OUT * max(float(np.median(losses)), 1.0)
 
 
 def _is_useful(found: Search, one: Tried) -> bool:

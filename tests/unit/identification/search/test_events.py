@@ -1,0 +1,82 @@
+"""What happened once stands out of a recording, in all channels or in one."""
+
+import numpy as np
+import pytest
+
+from shared.identification.catalogue.external_contact import EFFECT as PUSH
+from shared.identification.catalogue.torque_bias import EFFECT as BIAS
+from shared.identification.dataset.types import Float64
+from shared.identification.effect import Candidate
+from shared.identification.fitting.fit import Fit, polish
+from shared.identification.fitting.space import Space
+from shared.identification.gate.held_out import plain_channels
+from shared.identification.search.events import explains_event, is_calm
+from shared.sim.plant.row import Row
+from tests.measured import measure, problem_of
+
+_PUSH = Candidate(PUSH, "elbow in first")
+_SIZE = np.array([0.2, 1.0, 0.5])
+"""Torque (N m), begin and length (s)."""
+
+
+def usual(worst: float = 1.0, channels: slice = slice(0, 1), stretches: slice = slice(7, 8)):
+    """Return losses of forty stretches of ten channels, some of which are off."""
+    losses = 1.0 + 0.1 * np.random.default_rng(0).standard_normal((40, 10))
+    losses[stretches, channels] = worst
+    return losses
+
+
+def test_noise_is_calm():
+    assert is_calm(usual())
+
+
+def test_one_channel_that_is_far_off_once_is_enough():
+    assert is_calm(usual(8.0))
+    assert not is_calm(usual(12.0))
+
+
+def test_all_channels_together_need_less():
+    assert is_calm(usual(5.0, slice(0, 10)))
+    assert not is_calm(usual(8.0, slice(0, 10)))
+
+
+def test_a_channel_that_is_always_off_is_calm():
+    assert is_calm(usual(12.0, stretches=slice(0, 40)))
+
+
+@pytest.fixture(scope="module")
+def pushed(tmp_path_factory: pytest.TempPathFactory) -> Fit:
+    """Return the nominal arm beside recordings in one of which an elbow was pushed once."""
+
+    def enter(row: Row) -> None:
+        PUSH.enter(row, _PUSH.place, _SIZE)
+
+    folder = tmp_path_factory.mktemp("pushed")
+    problem = problem_of(measure(folder, np.random.default_rng(0), enter, seconds=4.0))
+    space = Space(problem)
+    return polish(space, np.zeros(space.size), problem.of("train"), steps=0)
+
+
+def beside(pushed: Fit, candidate: Candidate, size: Float64) -> Fit:
+    """Return the same with a cause of a size, in its units."""
+    space = pushed.space.grown(candidate)
+    quantities = candidate.effect.quantities(space.problem.subject, candidate.place)
+    start = np.r_[pushed.z, size / np.array([each.probe for each in quantities])]
+    return polish(space, start, space.problem.of("train"), steps=0)
+
+
+def test_a_push_of_one_joint_stands_out_and_is_explained_by_itself(pushed: Fit):
+    train = pushed.space.problem.of("train")
+    before = plain_channels(pushed.space.problem, pushed.variant, train)
+    assert before.mean(axis=1).max() < 6.0  # too little of all channels
+    assert not is_calm(before)
+    assert explains_event(_PUSH, before, beside(pushed, _PUSH, _SIZE), train)
+
+
+def test_what_leaves_it_or_acts_all_the_time_does_not_explain_it(pushed: Fit):
+    train = pushed.space.problem.of("train")
+    before = plain_channels(pushed.space.problem, pushed.variant, train)
+    late = np.array([_SIZE[0], _SIZE[1] + 1.5, _SIZE[2]])
+    assert not explains_event(_PUSH, before, beside(pushed, _PUSH, late), train)
+    bias = Candidate(BIAS, "elbow")
+    assert not explains_event(bias, before, beside(pushed, bias, _SIZE[:1]), train)
