@@ -2,7 +2,8 @@
 
 Held-out recordings cannot show what happened once in another one. So what stands out must be far
 over everything else, more than noise that is the same throughout would ever be, in all channels
-together or in one alone: a hand on a wrist moves one joint of seven.
+together or in one alone: a hand on a wrist moves one joint of seven. Beside a cause one channel is
+not enough: no law is quite the arm's, and what a named one leaves is off most at its own joint.
 """
 
 from dataclasses import dataclass
@@ -32,36 +33,41 @@ class Usual:
     """float64[C], of each of them."""
 
     @staticmethod
-    def of(losses: Float64) -> "Usual":
-        """Return it, given float64[S, C], plain mean squares of stretches, in noise floors."""
-        median = float(np.median(losses.mean(axis=1)))
-        return Usual(
-            STANDS_OUT * max(median, 1.0), _ALONE * np.maximum(np.median(losses, axis=0), 1.0)
-        )
+    def of(losses: Float64, is_beside: bool) -> "Usual":
+        """Return it.
+
+        Args:
+            losses: float64[S, C], plain mean squares of stretches, in noise floors.
+            is_beside: whether a cause was named, so that no channel counts alone.
+        """
+        together = STANDS_OUT * max(float(np.median(losses.mean(axis=1))), 1.0)
+        each = _ALONE * np.maximum(np.median(losses, axis=0), 1.0)
+        return Usual(together, np.full_like(each, np.inf) if is_beside else each)
 
     def exceeded(self, losses: Float64) -> Float64:
         """Return float64[S], how many times as much stretches leave, of float64[S, C]."""
         alone: Float64 = (losses / self.each).max(axis=1)
         return np.maximum(losses.mean(axis=1) / self.together, alone)
 
+    def is_calm(self, losses: Float64) -> bool:
+        """Return whether nothing stands out of float64[S, C]."""
+        return float(self.exceeded(losses).max()) <= 1.0
 
-def is_calm(losses: Float64) -> bool:
-    """Return whether nothing stands out of float64[S, C], plain mean squares of stretches."""
-    return float(Usual.of(losses).exceeded(losses).max()) <= 1.0
 
-
-def explains_event(candidate: Candidate, before: Float64, fit: Fit, train: tuple[int, ...]) -> bool:
+def explains_event(
+    candidate: Candidate, usual: Usual, before: Float64, fit: Fit, train: tuple[int, ...]
+) -> bool:
     """Return whether a cause that is in one recording takes away what stands out there.
 
     Args:
         candidate: the cause.
+        usual: what stretches leave at most in which nothing happened.
         before: float64[S, C], plain losses of stretches without it, of what was fitted to.
         fit: with it.
         train: recordings to fit to.
     """
     if candidate.recording is None:
         return False
-    usual = Usual.of(before)
     off = usual.exceeded(before)
     left = usual.exceeded(plain_channels(fit.space.problem, fit.variant, train))
     worst = int(np.argmax(off - left))

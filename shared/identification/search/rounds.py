@@ -12,13 +12,14 @@ from shared.identification.fitting.turns import LATE
 from shared.identification.gate.certainty import SURE, is_there
 from shared.identification.gate.held_out import (
     LEAST_SHARE,
+    Taken,
     compare,
     floor_of,
     plain_channels,
     stretches,
 )
 from shared.identification.progress import Progress
-from shared.identification.search.events import explains_event, is_calm
+from shared.identification.search.events import Usual, explains_event
 from shared.identification.search.family import Family, look_elsewhere, relatives
 from shared.identification.search.fewer import one_for_many, prune, tell_apart
 from shared.identification.search.look import look
@@ -67,8 +68,11 @@ _OF_MANY = 3.2
 """Standard errors that a cause is off nothing by where noise was not measured: of forty candidates
 one is by so much by chance once in twenty times (Bonferroni)."""
 _BESIDE = 0.02
-"""Of the noise: what is held out must follow a cause beside others by so much. No law is quite the
-arm's, and what a named one leaves of what it did is surely there, too, and looks like others."""
+"""Of the noise: what is held out must follow a cause beside others by so much, or follow it at all
+and surely have so much less left. No law is quite the arm's, and what a named one leaves of what it
+did is surely there, too, and looks like others."""
+_OF_LINKS = {"payload", "inertia_error"}
+"""Causes that may be nothing but links that are other than their file."""
 _STANDS_OFF = {
     frozenset({"encoder_offset", "payload"}): ALIKE,
     frozenset({"encoder_offset", "backlash"}): 0.1,
@@ -130,12 +134,13 @@ def _round(
     is_measured = found.problem.noise.is_measured
     now = found.current.variant
     before = plain_channels(found.problem, now, train)
+    usual = Usual.of(before, is_beside=bool(found.accepted))
     is_off = max(float(found.current_losses.mean()), float(before.mean())) > _FAR_OFF
     is_far = not is_measured or is_off
+    is_calm = usual.is_calm(before)
     screened, roughly = look(
-        found.parts, found.nominal, left, is_far, progress, is_calm(before), hopeless(found),
-        found.seen,
-    )  # fmt: skip
+        found.parts, found.nominal, left, is_far, progress, is_calm, hopeless(found), found.seen
+    )
     for each in screened:
         found.screened.setdefault(each.candidate.label, each)
     tried: list[Tried] = []
@@ -145,7 +150,7 @@ def _round(
         progress("decide", len(tried) / _FULL, each.screened.candidate.label)
         space = Space(found.problem, each.space.candidates)
         fit = settle(space, each.z, train, found.current)
-        is_event = explains_event(each.screened.candidate, before, fit, train)
+        is_event = explains_event(each.screened.candidate, usual, before, fit, train)
         one = _tried(found, each.screened, fit, is_event)
         is_hidden = not one.is_told and one.gain.gain > 0.0
         tried.append(_begun_anew(found, one, train) if is_hidden else one)
@@ -239,16 +244,21 @@ def _elsewhere(
 def _is_useful(found: Search, one: Tried) -> bool:
     """Return whether a cause passes, beside what was named before it if anything was.
 
-    Of a payload or a link's inertia what is held out cannot tell that, see ``foretold.py``.
+    What happened once leaves nothing of what it did elsewhere. Of a payload or a link's inertia
+    what is held out cannot tell that, see ``foretold.py``.
     """
-    if not one.gain.is_useful(float(found.base_losses.mean())):
+    gain = one.gain
+    if not gain.is_useful(float(found.base_losses.mean())):
         return False
-    if not found.accepted or not found.problem.noise.is_white:
+    lasting = [each for each in found.accepted if not each.is_event]
+    if not lasting or not found.problem.noise.is_white:
         return True
     if not one.is_told:
-        return True
-    apart = one.gain.apart
-    return apart is not None and apart.gain >= _BESIDE * apart.before
+        return one.candidate.effect.name in _OF_LINKS
+    if gain.apart is None:
+        return False
+    ways = [gain.apart] + [Taken(gain.before, gain.gain)] * (gain.surely > 0.0)
+    return any(taken.gain >= _BESIDE * taken.before for taken in ways)
 
 
 def _sure(useful: list[Tried], train: tuple[int, ...], is_measured: bool) -> list[Tried]:

@@ -10,7 +10,7 @@ from shared.identification.effect import Candidate
 from shared.identification.fitting.fit import Fit, polish
 from shared.identification.fitting.space import Space
 from shared.identification.gate.held_out import plain_channels
-from shared.identification.search.events import explains_event, is_calm
+from shared.identification.search.events import Usual, explains_event
 from shared.sim.plant.row import Row
 from tests.measured import measure, problem_of
 
@@ -19,29 +19,38 @@ _SIZE = np.array([0.2, 1.0, 0.5])
 """Torque (N m), begin and length (s)."""
 
 
-def usual(worst: float = 1.0, channels: slice = slice(0, 1), stretches: slice = slice(7, 8)):
-    """Return losses of forty stretches of ten channels, some of which are off."""
-    losses = 1.0 + 0.1 * np.random.default_rng(0).standard_normal((40, 10))
-    losses[stretches, channels] = worst
-    return losses
+def losses(worst: float = 1.0, channels: slice = slice(0, 1), stretches: slice = slice(7, 8)):
+    """Return those of forty stretches of ten channels, some of which are off."""
+    found = 1.0 + 0.1 * np.random.default_rng(0).standard_normal((40, 10))
+    found[stretches, channels] = worst
+    return found
+
+
+def is_calm(found: Float64, is_beside: bool = False) -> bool:
+    return Usual.of(found, is_beside).is_calm(found)
 
 
 def test_noise_is_calm():
-    assert is_calm(usual())
+    assert is_calm(losses())
 
 
 def test_one_channel_that_is_far_off_once_is_enough():
-    assert is_calm(usual(8.0))
-    assert not is_calm(usual(12.0))
+    assert is_calm(losses(8.0))
+    assert not is_calm(losses(12.0))
+
+
+def test_beside_a_cause_one_channel_is_what_its_law_left():
+    assert is_calm(losses(12.0), is_beside=True)
+    assert not is_calm(losses(8.0, slice(0, 10)), is_beside=True)
 
 
 def test_all_channels_together_need_less():
-    assert is_calm(usual(5.0, slice(0, 10)))
-    assert not is_calm(usual(8.0, slice(0, 10)))
+    assert is_calm(losses(5.0, slice(0, 10)))
+    assert not is_calm(losses(8.0, slice(0, 10)))
 
 
 def test_a_channel_that_is_always_off_is_calm():
-    assert is_calm(usual(12.0, stretches=slice(0, 40)))
+    assert is_calm(losses(12.0, stretches=slice(0, 40)))
 
 
 @pytest.fixture(scope="module")
@@ -65,18 +74,21 @@ def beside(pushed: Fit, candidate: Candidate, size: Float64) -> Fit:
     return polish(space, start, space.problem.of("train"), steps=0)
 
 
-def test_a_push_of_one_joint_stands_out_and_is_explained_by_itself(pushed: Fit):
+def is_explained(pushed: Fit, candidate: Candidate, size: Float64, is_beside: bool = False) -> bool:
+    """Return whether a cause of a size explains what stands out."""
     train = pushed.space.problem.of("train")
     before = plain_channels(pushed.space.problem, pushed.variant, train)
     assert before.mean(axis=1).max() < 6.0  # too little of all channels
     assert not is_calm(before)
-    assert explains_event(_PUSH, before, beside(pushed, _PUSH, _SIZE), train)
+    usual = Usual.of(before, is_beside)
+    return explains_event(candidate, usual, before, beside(pushed, candidate, size), train)
+
+
+def test_a_push_of_one_joint_stands_out_and_is_explained_by_itself(pushed: Fit):
+    assert is_explained(pushed, _PUSH, _SIZE)
+    assert not is_explained(pushed, _PUSH, _SIZE, is_beside=True)
 
 
 def test_what_leaves_it_or_acts_all_the_time_does_not_explain_it(pushed: Fit):
-    train = pushed.space.problem.of("train")
-    before = plain_channels(pushed.space.problem, pushed.variant, train)
-    late = np.array([_SIZE[0], _SIZE[1] + 1.5, _SIZE[2]])
-    assert not explains_event(_PUSH, before, beside(pushed, _PUSH, late), train)
-    bias = Candidate(BIAS, "elbow")
-    assert not explains_event(bias, before, beside(pushed, bias, _SIZE[:1]), train)
+    assert not is_explained(pushed, _PUSH, np.array([_SIZE[0], _SIZE[1] + 1.5, _SIZE[2]]))
+    assert not is_explained(pushed, Candidate(BIAS, "elbow"), _SIZE[:1])

@@ -44,6 +44,7 @@ from shared.identification.search.searched import Tried
 from shared.identification.verdict import Verdict
 from tests.searches import DRAG, ELBOW, LIFT, Searches
 
+_LOAD = Candidate(PAYLOAD, "")
 _BAD = np.linspace(8.0, 12.0, 8)
 _GOOD = np.linspace(1.0, 1.2, 8)
 
@@ -173,26 +174,43 @@ def test_where_noise_was_not_measured_what_may_as_well_be_nothing_is_never_taken
 
 
 @pytest.mark.parametrize(
-    ("takes", "kept", "beside"),
-    [(0.05, 0.5, True), (0.01, 0.5, False), (None, 0.5, False), (0.01, 0.05, True)],
-    ids=["plain", "slight", "not followed", "a link's, which cannot show there"],
-)
+    ("candidate", "takes", "kept", "surely", "beside"),
+    [
+        (ELBOW, 0.05, 0.5, -0.1, True),
+        (ELBOW, 0.01, 0.5, -0.1, False),
+        (ELBOW, 0.01, 0.5, 0.1, True),
+        (ELBOW, None, 0.5, 0.1, False),
+        (_LOAD, 0.01, 0.05, 0.1, True),
+        (ELBOW, 0.01, 0.05, 0.1, False),
+    ],
+    ids=[
+        "plain", "slight", "slight, and surely less is left", "not followed",
+        "a link's, which cannot show there", "what the base can do there",
+    ],
+)  # fmt: skip
 def test_beside_a_cause_held_out_motion_must_follow_another_plainly(
-    searches: Searches, takes: float | None, kept: float, beside: bool
-):
+    searches: Searches, candidate: Candidate, takes: float | None, kept: float, surely: float,
+    beside: bool,
+):  # fmt: skip
     first = searches.tried(DRAG, _BAD, _GOOD + 2.0)
-    other = searches.tried(ELBOW, _GOOD + 2.0, _GOOD)
+    other = searches.tried(candidate, _GOOD + 2.0, _GOOD)
     apart = None if takes is None else Taken(1.0, takes)
     gain = replace(other.gain, is_measured=True, apart=apart)
     other = replace(other, gain=gain, foretold=Foretold(9.0, 0.9, kept))
-    alone, after = searches.search(_BAD), searches.search(_BAD, first)
-    for found in (alone, after):
+    alone, after, once = (
+        searches.search(_BAD),
+        searches.search(_BAD, first),
+        searches.search(_BAD, replace(first, is_event=True)),
+    )
+    for found in (alone, after, once):
         found.problem = copy.copy(found.problem)
         found.problem.noise = replace(found.problem.noise, is_measured=True, memory=np.eye(1))
     assert _is_useful(alone, other)
+    assert _is_useful(once, other)  # what happened once leaves nothing elsewhere
+    other = replace(other, gain=replace(gain, surely=surely))
     assert _is_useful(after, other) is beside
     after.problem.noise = replace(after.problem.noise, memory=None)
-    assert _is_useful(after, other)  # nobody knows what is new in noise
+    assert _is_useful(after, replace(other, gain=gain))  # nobody knows what is new in noise
 
 
 def test_turns_so_short_that_they_are_a_delay_are_a_rival_of_it(searches: Searches):
