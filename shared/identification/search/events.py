@@ -2,8 +2,9 @@
 
 Held-out recordings cannot show what happened once in another one. So what stands out must be far
 over everything else, more than noise that is the same throughout would ever be, in all channels
-together or in one alone: a hand on a wrist moves one joint of seven. Beside a cause one channel is
-not enough: no law is quite the arm's, and what a named one leaves is off most at its own joint.
+together or in one alone: a hand on a wrist moves one joint of seven. One is not enough beside a
+cause, since no law is quite the arm's and what a named one leaves is off most at its own joint, nor
+where no repeat says what noise is: an arm that sticks and slips leaves as much now and then.
 """
 
 from dataclasses import dataclass
@@ -33,16 +34,16 @@ class Usual:
     """float64[C], of each of them."""
 
     @staticmethod
-    def of(losses: Float64, is_beside: bool) -> "Usual":
+    def of(losses: Float64, is_one_enough: bool) -> "Usual":
         """Return it.
 
         Args:
             losses: float64[S, C], plain mean squares of stretches, in noise floors.
-            is_beside: whether a cause was named, so that no channel counts alone.
+            is_one_enough: whether a channel counts alone.
         """
         together = STANDS_OUT * max(float(np.median(losses.mean(axis=1))), 1.0)
         each = _ALONE * np.maximum(np.median(losses, axis=0), 1.0)
-        return Usual(together, np.full_like(each, np.inf) if is_beside else each)
+        return Usual(together, each if is_one_enough else np.full_like(each, np.inf))
 
     def exceeded(self, losses: Float64) -> Float64:
         """Return float64[S], how many times as much stretches leave, of float64[S, C]."""

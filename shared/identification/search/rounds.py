@@ -134,7 +134,7 @@ def _round(
     is_measured = found.problem.noise.is_measured
     now = found.current.variant
     before = plain_channels(found.problem, now, train)
-    usual = Usual.of(before, is_beside=bool(found.accepted))
+    usual = Usual.of(before, is_one_enough=is_measured and not found.accepted)
     is_off = max(float(found.current_losses.mean()), float(before.mean())) > _FAR_OFF
     is_far = not is_measured or is_off
     is_calm = usual.is_calm(before)

@@ -26,8 +26,8 @@ def losses(worst: float = 1.0, channels: slice = slice(0, 1), stretches: slice =
     return found
 
 
-def is_calm(found: Float64, is_beside: bool = False) -> bool:
-    return Usual.of(found, is_beside).is_calm(found)
+def is_calm(found: Float64, is_one_enough: bool = True) -> bool:
+    return Usual.of(found, is_one_enough).is_calm(found)
 
 
 def test_noise_is_calm():
@@ -39,9 +39,9 @@ def test_one_channel_that_is_far_off_once_is_enough():
     assert not is_calm(losses(12.0))
 
 
-def test_beside_a_cause_one_channel_is_what_its_law_left():
-    assert is_calm(losses(12.0), is_beside=True)
-    assert not is_calm(losses(8.0, slice(0, 10)), is_beside=True)
+def test_where_one_channel_is_not_enough_it_takes_all():
+    assert is_calm(losses(12.0), is_one_enough=False)
+    assert not is_calm(losses(8.0, slice(0, 10)), is_one_enough=False)
 
 
 def test_all_channels_together_need_less():
@@ -74,19 +74,21 @@ def beside(pushed: Fit, candidate: Candidate, size: Float64) -> Fit:
     return polish(space, start, space.problem.of("train"), steps=0)
 
 
-def is_explained(pushed: Fit, candidate: Candidate, size: Float64, is_beside: bool = False) -> bool:
+def is_explained(
+    pushed: Fit, candidate: Candidate, size: Float64, is_one_enough: bool = True
+) -> bool:
     """Return whether a cause of a size explains what stands out."""
     train = pushed.space.problem.of("train")
     before = plain_channels(pushed.space.problem, pushed.variant, train)
     assert before.mean(axis=1).max() < 6.0  # too little of all channels
     assert not is_calm(before)
-    usual = Usual.of(before, is_beside)
+    usual = Usual.of(before, is_one_enough)
     return explains_event(candidate, usual, before, beside(pushed, candidate, size), train)
 
 
 def test_a_push_of_one_joint_stands_out_and_is_explained_by_itself(pushed: Fit):
     assert is_explained(pushed, _PUSH, _SIZE)
-    assert not is_explained(pushed, _PUSH, _SIZE, is_beside=True)
+    assert not is_explained(pushed, _PUSH, _SIZE, is_one_enough=False)
 
 
 def test_what_leaves_it_or_acts_all_the_time_does_not_explain_it(pushed: Fit):
