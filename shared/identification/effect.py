@@ -40,6 +40,8 @@ class Quantity:
     """Where to look first. Of a number that says how, not how much, and means nothing while the
     others are 0: its probe is only what it is counted in. Or of an only number, not smooth, that
     acts from some size on."""
+    least: float = 0.0
+    """Below this size, either way, it is no more than what the simulation is off by itself."""
 
 
 class Effect(Protocol):

@@ -20,8 +20,9 @@ class CommandLatency:
         return ("",)
 
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
-        """Return the delay."""
-        return (Quantity("delay", "s", 0.0, 0.2, probe=0.01),)
+        """Return the delay; by half of its step a simulation is late or early itself."""
+        least = 0.5 * subject.plant.timestep
+        return (Quantity("delay", "s", 0.0, 0.2, probe=0.01, least=least),)
 
     def structure(self, subject: Subject, place: str) -> Structure:
         """Return nothing: only the command changes."""

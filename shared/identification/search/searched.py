@@ -86,6 +86,15 @@ class Tried:
         """Return how many numbers the effect has."""
         return len(self.screened.start)
 
+    @property
+    def is_of_the_simulation(self) -> bool:
+        """Return whether it is so small that the simulation is off by as much itself."""
+        quantities = self.candidate.effect.quantities(
+            self.fit.space.problem.subject, self.candidate.place
+        )
+        values = self.fit.space.values(self.fit.z)[-1]
+        return any(abs(value) < each.least for value, each in zip(values, quantities, strict=True))
+
 
 def cosine(one: Tried, other: Tried) -> float:
     """Return how much of what two causes explain is the same, without what the base could."""

@@ -213,6 +213,17 @@ def test_beside_a_cause_held_out_motion_must_follow_another_plainly(
     assert _is_useful(after, replace(other, gain=gain))  # nobody knows what is new in noise
 
 
+@pytest.mark.parametrize(("of_step", "is_useful"), [(0.4, False), (0.6, True)])
+def test_a_delay_of_less_than_half_a_step_is_the_simulations(
+    searches: Searches, of_step: float, is_useful: bool
+):
+    one = searches.tried(Candidate(LATE, ""), _BAD, _GOOD)
+    z = one.fit.z.copy()
+    z[-1] = of_step * searches.problem.subject.plant.timestep / 0.01  # of the delay's probe
+    one = replace(one, fit=replace(one.fit, z=z))
+    assert _is_useful(searches.search(_BAD), one) is is_useful
+
+
 def test_turns_so_short_that_they_are_a_delay_are_a_rival_of_it(searches: Searches):
     late = searches.tried(Candidate(LATE, ""), _BAD, _GOOD)
     about = 0.01 + np.tile([-0.06, 0.06], 4)  # better in one stretch, worse in the next
