@@ -50,7 +50,8 @@ class Latched:
             for b in range(SECONDS)
         ]
         segments = [SimpleNamespace(recorded=part) for part in parts]
-        self.problem = SimpleNamespace(segments=segments, subject=None)
+        subject = SimpleNamespace(plant=SimpleNamespace(timestep=0.002))
+        self.problem = SimpleNamespace(segments=segments, subject=subject)
         self.looks = 0
 
         self.candidates = (Candidate(HOLD, ""),)
