@@ -178,6 +178,10 @@ class Start:
     jacobian: Float64
     """float64[M + n, n]."""
 
+    def with_causes_of(self, fit: Fit) -> Float64:
+        """Return the vector, of the base alone, with the causes that a fit has."""
+        return np.r_[self.z, fit.z[self.z.size :]]
+
 
 @dataclass(frozen=True)
 class BaseFits:

@@ -91,7 +91,7 @@ def _from_nominal(
     """Return where a refit comes to that begins at the nominal model."""
     space = fit.space.grown(screened.candidate)
     is_form = screened.candidate.forms(fit.space.problem.subject)
-    base = np.r_[nominal.z, fit.z[nominal.z.size :]]
+    base = nominal.with_causes_of(fit)
     half = np.where(is_form, screened.start, 0.5 * screened.start)
     sizes = [space.clip(np.r_[base, size]) for size in (screened.start, half)]
     kept = nominal.jacobian[: len(rows)][rows]

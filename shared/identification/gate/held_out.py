@@ -151,7 +151,7 @@ def stretches(problem: Problem, variant: Variant, segments: tuple[int, ...]) -> 
 
     A part of a recording counts without the blocks that the problem says not to count.
     """
-    return _of_all(problem, segments, problem.residuals([variant], segments)[0])
+    return _of_all(problem, segments, problem.residuals([variant], segments)[0]).mean(axis=1)
 
 
 def plain_stretches(problem: Problem, variant: Variant, segments: tuple[int, ...]) -> Float64:
@@ -161,12 +161,11 @@ def plain_stretches(problem: Problem, variant: Variant, segments: tuple[int, ...
 
 def plain_channels(problem: Problem, variant: Variant, segments: tuple[int, ...]) -> Float64:
     """Return float64[S, C], the same of each channel."""
-    parts = zip(segments, problem.plain(variant, segments), strict=True)
-    return np.concatenate([_by_channel(problem, *each) for each in parts])
+    return _of_all(problem, segments, problem.plain(variant, segments))
 
 
 def _of_all(problem: Problem, segments: tuple[int, ...], parts: list[Float64]) -> Float64:
-    found = [parted(problem, *each) for each in zip(segments, parts, strict=True)]
+    found = [_by_channel(problem, *each) for each in zip(segments, parts, strict=True)]
     return np.concatenate(found)
 
 

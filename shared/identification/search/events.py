@@ -50,26 +50,21 @@ class Usual:
         alone: Float64 = (losses / self.each).max(axis=1)
         return np.maximum(losses.mean(axis=1) / self.together, alone)
 
-    def is_calm(self, losses: Float64) -> bool:
-        """Return whether nothing stands out of float64[S, C]."""
-        return float(self.exceeded(losses).max()) <= 1.0
-
 
 def explains_event(
-    candidate: Candidate, usual: Usual, before: Float64, fit: Fit, train: tuple[int, ...]
+    candidate: Candidate, usual: Usual, off: Float64, fit: Fit, train: tuple[int, ...]
 ) -> bool:
     """Return whether a cause that is in one recording takes away what stands out there.
 
     Args:
         candidate: the cause.
         usual: what stretches leave at most in which nothing happened.
-        before: float64[S, C], plain losses of stretches without it, of what was fitted to.
+        off: float64[S], how many times as much stretches of what was fitted to leave without it.
         fit: with it.
         train: recordings to fit to.
     """
     if candidate.recording is None:
         return False
-    off = usual.exceeded(before)
     left = usual.exceeded(plain_channels(fit.space.problem, fit.variant, train))
     worst = int(np.argmax(off - left))
     is_explained = (

@@ -7,8 +7,6 @@ then missing looked like a friction. Seen from the nominal model it comes first.
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
 from shared.identification.effect import Candidate
 from shared.identification.fitting.fit import Fit, Start
 from shared.identification.fitting.refit import Rough, refit, refit_late
@@ -65,7 +63,7 @@ def look(
     ]
     if is_far:
         progress("screen", 0.5, "again, from the nominal model")
-        far = Fit.at(fit.space, np.r_[nominal.z, fit.z[nominal.z.size :]], segments)
+        far = Fit.at(fit.space, nominal.with_causes_of(fit), segments)
         known = {each.candidate for each, _ in picked}
         new = [
             each

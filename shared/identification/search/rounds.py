@@ -12,7 +12,6 @@ from shared.identification.fitting.turns import LATE
 from shared.identification.gate.certainty import SURE, is_there
 from shared.identification.gate.held_out import (
     LEAST_SHARE,
-    Taken,
     compare,
     floor_of,
     plain_channels,
@@ -137,7 +136,8 @@ def _round(
     usual = Usual.of(before, is_one_enough=is_measured and not found.accepted)
     is_off = max(float(found.current_losses.mean()), float(before.mean())) > _FAR_OFF
     is_far = not is_measured or is_off
-    is_calm = usual.is_calm(before)
+    off = usual.exceeded(before)
+    is_calm = float(off.max()) <= 1.0
     screened, roughly = look(
         found.parts, found.nominal, left, is_far, progress, is_calm, hopeless(found), found.seen
     )
@@ -150,7 +150,7 @@ def _round(
         progress("decide", len(tried) / _FULL, each.screened.candidate.label)
         space = Space(found.problem, each.space.candidates)
         fit = settle(space, each.z, train, found.current)
-        is_event = explains_event(each.screened.candidate, usual, before, fit, train)
+        is_event = explains_event(each.screened.candidate, usual, off, fit, train)
         one = _tried(found, each.screened, fit, is_event)
         is_hidden = not one.is_told and one.gain.gain > 0.0
         tried.append(_begun_anew(found, one, train) if is_hidden else one)
@@ -190,8 +190,8 @@ def _begun_anew(found: Search, one: Tried, train: tuple[int, ...]) -> Tried:
     base anywhere. Seen beside a base that has links bent towards it, it is a third of its size; so
     it is fitted from the model file's links, too.
     """
-    far = np.r_[found.nominal.z, found.current.z[found.nominal.z.size :]]
-    starts = [np.r_[z, one.screened.start] for z in (found.current.z, far)]
+    begins = (found.current.z, found.nominal.with_causes_of(found.current))
+    starts = [np.r_[z, one.screened.start] for z in begins]
     fits = [polish(one.fit.space, start, train, _AFRESH) for start in starts]
     fit = min(fits, key=lambda each: each.cost)
     if fit.cost >= one.fit.cost:
@@ -257,8 +257,8 @@ def _is_useful(found: Search, one: Tried) -> bool:
         return one.candidate.effect.name in _OF_LINKS
     if gain.apart is None:
         return False
-    ways = [gain.apart] + [Taken(gain.before, gain.gain)] * (gain.surely > 0.0)
-    return any(taken.gain >= _BESIDE * taken.before for taken in ways)
+    is_less_left = gain.surely > 0.0 and gain.gain >= _BESIDE * gain.before
+    return is_less_left or gain.apart.gain >= _BESIDE * gain.apart.before
 
 
 def _sure(useful: list[Tried], train: tuple[int, ...], is_measured: bool) -> list[Tried]:

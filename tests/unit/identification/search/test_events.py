@@ -27,7 +27,7 @@ def losses(worst: float = 1.0, channels: slice = slice(0, 1), stretches: slice =
 
 
 def is_calm(found: Float64, is_one_enough: bool = True) -> bool:
-    return Usual.of(found, is_one_enough).is_calm(found)
+    return float(Usual.of(found, is_one_enough).exceeded(found).max()) <= 1.0
 
 
 def test_noise_is_calm():
@@ -83,7 +83,8 @@ def is_explained(
     assert before.mean(axis=1).max() < 6.0  # too little of all channels
     assert not is_calm(before)
     usual = Usual.of(before, is_one_enough)
-    return explains_event(candidate, usual, before, beside(pushed, candidate, size), train)
+    off = usual.exceeded(before)
+    return explains_event(candidate, usual, off, beside(pushed, candidate, size), train)
 
 
 def test_a_push_of_one_joint_stands_out_and_is_explained_by_itself(pushed: Fit):
