@@ -19,7 +19,7 @@ The client reconnects by itself within half a second of a router's return, but n
 import contextlib
 import secrets
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias, TypeVar
 
 import structlog
@@ -49,9 +49,14 @@ Declare: TypeAlias = Callable[[zenoh.Session], Any]
 
 UPKEEP_SECONDS = 0.25
 CLOSE_SECONDS = 3.0
+"""Longest wait for a session to close; a thread that hangs in it is left behind."""
 MOST_RUNS = 64
 """Of one bus that are told apart."""
-"""Longest wait for a session to close; a thread that hangs in it is left behind."""
+LOG_FILTER = "error,zenoh::api::session=off"
+"""What Zenoh says on stdout, where RUST_LOG asks for nothing else.
+
+A session that is closed forgets its keys first, and calls what still comes for them an error.
+"""
 
 log = structlog.get_logger()
 
@@ -75,7 +80,7 @@ def open_zenoh(
     """
     check_chunk("name", name)
     check_chunk("run", run)
-    zenoh.init_log_from_env_or("error")
+    zenoh.init_log_from_env_or(LOG_FILTER)
     if cfg.certificates:
         check_files(cfg.certificates, role)
     config = client_json(cfg, role)
@@ -131,7 +136,7 @@ class ZenohBus:
             clock, self._counts, self._news.set, cfg.inbox_messages, cfg.inbox_mib << 20
         )
         self._watchdog = Watchdog(
-            cfg, clock, session, _has_router, lambda: _try_open(config), self._close
+            cfg, clock, session, _has_router, lambda: _try_open(config), close_session
         )
         self._declared: dict[object, tuple[Declare, Any]] = {}
         self._present: dict[str, Present] = {}
@@ -314,9 +319,6 @@ class ZenohBus:
                 entity = declare(session)
         self._declared[owner] = (declare, entity)
 
-    def _close(self, session: zenoh.Session) -> None:
-        close_session(session, [entity for _, entity in list(self._declared.values()) if entity])
-
     def _undeclare(self, owner: object) -> None:
         _, entity = self._declared.pop(owner, (None, None))
         if entity is not None:
@@ -385,17 +387,10 @@ def _try_open(config: str) -> zenoh.Session | None:
     return None
 
 
-def close_session(session: zenoh.Session, declared: Iterable[Any] = ()) -> None:
-    """Close a session, at most ``CLOSE_SECONDS`` long.
-
-    What was ``declared`` in it goes first: of what still comes for that, a session that is being
-    closed knows the key no more, and says so as an error on stdout.
-    """
+def close_session(session: zenoh.Session) -> None:
+    """Close a session, at most ``CLOSE_SECONDS`` long."""
 
     def close() -> None:
-        for entity in declared:
-            with contextlib.suppress(zenoh.ZError):
-                entity.undeclare()
         with contextlib.suppress(zenoh.ZError):
             session.close()
 
