@@ -37,6 +37,8 @@ class Evaluation:
         self._numbers = np.arange(env.num_envs, dtype=np.int64)
         self._count = bouts
         self._meter = StyleMeter(env.num_envs, env.model.cfg.control_timestep)
+        self.num_envs = env.num_envs
+        """Worlds that are stepped for it."""
         self.left = env.rules.bout_steps
         antagonist, protagonist = players
         env.offset_scales = (antagonist.offset_scale, protagonist.offset_scale)

@@ -37,6 +37,11 @@ class FrameSampler:
         self._frames: list[tuple[int, Float32s, Float32s, Float32s]] = []
         self._marks: list[tuple[float, bool, bool, bool]] = []
 
+    def watch(self, env: FencingEnv) -> None:
+        """Forget the bout that was followed; from here on look at these worlds."""
+        self.abandon()
+        self._env = env
+
     def abandon(self) -> None:
         """Forget the bout that is being followed; its world starts something else."""
         self._following = False

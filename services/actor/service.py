@@ -34,6 +34,8 @@ Arrays = dict[str, NDArray[Any]]
 
 UNPLAYABLE_SECONDS, MOST_UNPLAYABLE_SECONDS = 1.0, 60.0
 """Before the next request for work when a lease could not be played; twice as long each time."""
+_MOSTLY_IDLE = 4
+"""Times as many worlds as an evaluation has bouts."""
 
 
 class Actor:
@@ -88,6 +90,8 @@ class Actor:
         """Name of the lease that collector or evaluation belong to."""
         self._collector: Collector | None = None
         self._evaluation: Evaluation | None = None
+        self._few: FencingEnv | None = None
+        """Worlds for evaluations of few bouts, once there was one."""
         self._unplayable_seconds = UNPLAYABLE_SECONDS
         self._rollout_sequence = 0
         self._resume: tuple[Arrays, dict[str, Any]] | None = None
@@ -190,6 +194,7 @@ class Actor:
         if self._policies.get(stage.agent) is None:
             self._wait_for(f"learner {stage.agent}: its first policy")
             return False
+        self._frames.watch(self._env)
         self._collector = Collector(
             self._env,
             AGENTS.index(stage.agent),
@@ -213,8 +218,21 @@ class Actor:
         antagonist, protagonist = players
         if antagonist is None or protagonist is None:
             return False
-        self._evaluation = Evaluation(self._env, (antagonist, protagonist), lease.bouts, lease.seed)
+        env = self._env_for(lease.bouts)
+        self._frames.watch(env)
+        self._evaluation = Evaluation(env, (antagonist, protagonist), lease.bouts, lease.seed)
         return True
+
+    def _env_for(self, bouts: int) -> FencingEnv:
+        """Return worlds for an evaluation: of its own, where it would leave most of them idle.
+
+        An actor on a graphics card has thousands, an evaluation some hundred bouts.
+        """
+        if bouts * _MOSTLY_IDLE > self._env.num_envs:
+            return self._env
+        if self._few is None or self._few.num_envs != bouts:
+            self._few = self._env.others(bouts)
+        return self._few
 
     def _player(self, reference: str, stochastic: bool) -> Player | None:
         player = self._opponents.get(reference, stochastic)
@@ -231,7 +249,7 @@ class Actor:
             return False
         if self._evaluation is not None:
             results = self._evaluation.advance(self._cfg.rollout_steps, self._frames.on_step)
-            self._count_steps(self._cfg.rollout_steps)
+            self._count_steps(self._cfg.rollout_steps * self._evaluation.num_envs)
             self._show(lease, WORLD, (lease.antagonist, lease.protagonist))
             if results is not None:
                 self._report(lease, results, (lease.antagonist, lease.protagonist))
@@ -252,7 +270,7 @@ class Actor:
         learning = self._policies.get(stage.agent)
         assert learning is not None  # the lease was not started without one
         segment = collector.collect(learning.policy, self._frames.on_step)
-        self._count_steps(self._cfg.rollout_steps)
+        self._count_steps(self._cfg.rollout_steps * self.num_envs)
         for part in cut(segment, self._parts):
             outbox.put(self._rollout(lease, stage, learning, part))
             self._rollout_sequence += 1
@@ -301,8 +319,7 @@ class Actor:
         if frames is not None:
             self._bus.publish(FRAMES, frames, name=self._bus.name)
 
-    def _count_steps(self, steps: int) -> None:
-        count = steps * self._env.num_envs
+    def _count_steps(self, count: int) -> None:
         self._counters["steps"] += count
         self._samples.add(count)
         self._waiting = ""

@@ -113,6 +113,10 @@ class FencingBatch:
             self._guard.record()
             self._advance()
 
+    def others(self, num_envs: int) -> "FencingBatch":
+        """Return so many other worlds of the same model, stepped by one thread, all en garde."""
+        return FencingBatch(self.model, num_envs)
+
     def reset(self, ids: Int64, qpos: Float64) -> None:
         """Put worlds at rest in a posture, each tool commanded to stay where it is.
 

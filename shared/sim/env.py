@@ -83,6 +83,11 @@ class FencingEnv:
         self.offset_scales = (1.0, 1.0)
         """How many times wider than configured each side's bounds are (``Player.offset_scale``)."""
 
+    def others(self, num_envs: int) -> "FencingEnv":
+        """Return so many other bouts of the same game, their worlds where these are."""
+        worlds = self.batch.others(num_envs)
+        return FencingEnv(self.model, self.rules, self._action, num_envs, worlds=worlds)
+
     @property
     def arena(self) -> Arena:
         """Return what a scripted player has to know of these worlds."""

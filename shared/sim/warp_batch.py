@@ -104,6 +104,10 @@ class WarpBatch:
             self._advance()
         self._look()
 
+    def others(self, num_envs: int) -> "WarpBatch":
+        """Return so many other worlds of the same model, on the same device, all en garde."""
+        return WarpBatch(self.model, num_envs, self._device)
+
     def reset(self, ids: Int64, qpos: Float64) -> None:
         """Put worlds at rest in a posture, each tool commanded to stay where it is.
 

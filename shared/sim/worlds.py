@@ -19,6 +19,10 @@ class Worlds(Protocol):
     qvel: Float64
     step: Callable[[], None]
 
+    def others(self, num_envs: int) -> "Worlds":
+        """Return so many other worlds of the same model, on the same device, all en garde."""
+        ...
+
     def reset(self, ids: Int64, qpos: Float64) -> None:
         """Put worlds at rest in a posture, each tool commanded to stay where it is."""
         ...

@@ -124,6 +124,22 @@ def test_a_world_is_reset_alone_and_a_state_continues(model: FencingModel, devic
 
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
+def test_other_bouts_have_worlds_of_their_own_where_these_are(model: FencingModel, device: str):
+    worlds = worlds_of("warp", model, WORLDS, device)
+    env = FencingEnv(model, RuleBook(), ActionConfig(), WORLDS, worlds=worlds)
+    others = env.others(1)
+    assert type(others.batch) is type(worlds)
+    assert others.batch.qpos.shape == (1, 14)
+    stood = worlds.qpos.copy()
+    others.batch.ctrl += 0.01
+    for _ in range(5):
+        others.batch.step()
+    assert np.abs(others.batch.qpos - stood[:1]).max() > 1e-4
+    np.testing.assert_array_equal(worlds.qpos, stood)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
 def test_bouts_are_judged_alike(model: FencingModel, device: str):
     rules, action = RuleBook(), ActionConfig()
     ours = FencingEnv(model, rules, action, WORLDS)

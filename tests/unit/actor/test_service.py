@@ -405,6 +405,33 @@ def test_an_evaluation_plays_its_bouts_from_start_to_end_and_equals_a_recount(ha
     assert waiting(hall) == "league: over"
 
 
+def test_an_evaluation_of_few_bouts_steps_no_more_worlds_than_it_has_bouts(hall: Hall):
+    bouts = WORLDS // 4
+    hall.offer = evaluation(hall, bouts=bouts)
+    hall.tick(4)
+    hall.offer = Lease(lease="", kind="none", reason="over")
+    hall.tick(10)
+    (results,) = hall.results
+    assert results.bouts.tolist() == list(range(bouts))
+    players = [GaussianPolicy(policy(seed=seed).weights) for seed in (1, 2)]
+    tallies = recounted_evaluation(worlds(bouts), players, seed=21)
+    assert results.score.tolist() == [tally.score for tally in tallies]
+    assert hall.actor.health().counters["steps"] == bouts * RULES.bout_steps
+
+
+def test_viewers_see_the_worlds_in_which_an_evaluation_of_few_bouts_is_played():
+    hall = Hall(msgspec.structs.replace(CONFIG, frame_period=2.0, frame_steps=4))
+    hall.offer = evaluation(hall, bouts=1)
+    hall.tick(4)
+    hall.offer = Lease(lease="", kind="none", reason="over")
+    hall.tick(10)
+    (results,) = hall.results
+    shown = [frames for frames in iter(hall.frames.take, None) if frames is not None]
+    assert shown
+    assert shown[-1].steps[-1] == RULES.bout_steps
+    assert shown[-1].score[-1] == results.score[0]
+
+
 def test_evaluations_of_one_seed_are_the_same_bouts_and_of_another_are_not(hall: Hall):
     for number, seed in enumerate((4, 4, 5)):
         hall.offer = evaluation(hall, lease=f"L{number:06d}", seed=seed, stochastic=True)
