@@ -56,6 +56,9 @@ _EVENT = 4.0
 what happened once would be most of the mean, and most of its error."""
 _NEARLY = 0.05
 """Of the cost on what was fitted to: by so much two causes that hardly differ may be apart."""
+_FITTED_BETTER, _FITTED_FAR_BETTER = 5.0, 12.5
+"""Of the cost: what one more number takes off by chance once in six hundred times, and a number
+that is five standard errors off nothing."""
 _APART = 0.5
 """Cosine of what two causes explain, up to which three quarters of it are not the same."""
 _BENT = 15.0
@@ -280,7 +283,8 @@ def _simplest(useful: list[Tried], rng: np.random.Generator) -> tuple[Tried, tup
     which something large happened has no more of a say than ``_EVENT`` usual ones. Where hardly
     more than noise is left, it is what the base could not make up for of what was held out; where
     much is, that would be most of what tells one large cause from another. Of what does as well as
-    the best one, and has links bent no further for it, the simplest is taken; what needs more
+    the best one, and has links bent no further for it, the simplest is taken, unless a load is
+    surely another one by what was fitted to; what needs more
     numbers to do no better is no rival, unless it is in the nature of both that they are hardly
     told apart.
     """
@@ -291,6 +295,7 @@ def _simplest(useful: list[Tried], rng: np.random.Generator) -> tuple[Tried, tup
     alike = [one for one in useful if one is best or _is_alike(best, one, left, rng)]
     bent = {one.candidate: _bent_by(one.fit) for one in alike}
     alike = [one for one in alike if bent[one.candidate] - min(bent.values()) <= _BENT]
+    alike = [one for one in alike if not any(_outdoes(each, one, is_apart, rng) for each in alike)]
     fewest = min(one.numbers for one in alike)
     simple = [one for one in alike if one.numbers == fewest]
     taken = min(simple, key=lambda one: left[one.candidate].mean())
@@ -309,15 +314,35 @@ def _bent_by(fit: Fit) -> float:
 def _is_nearly(taken: Tried, other: Tried, is_apart: bool, rng: np.random.Generator) -> bool:
     """Return whether another cause hardly differs from what is taken, in nature and in these data.
 
-    Both of the recordings that were fitted to and of those that were held out.
+    Both of the recordings that were fitted to and of those that were held out: these may prefer
+    what is taken by what chance does, or surely no more than that (95 %) where the others surely
+    prefer what is not.
     """
     name, of_taken = other.candidate.effect.name, taken.candidate.effect.name
     share = _STANDS_OFF.get(frozenset({name, of_taken}), 0.0)
     if not share and LATE.get(name) != of_taken and not {name, of_taken} <= _LOADS:
         return False
+    if _outdoes(taken, other, is_apart, rng):
+        return False
     margin = compare(other.held(is_apart), taken.held(is_apart), rng)
-    least = max(margin.error, share * taken.gain.gain)
+    is_fitted_better = taken.fit.cost - other.fit.cost > _FITTED_BETTER
+    errors = SURE if is_fitted_better else 1.0
+    least = max(errors * margin.error, share * taken.gain.gain)
     return margin.gain < least and other.fit.cost <= (1 + _NEARLY) * taken.fit.cost
+
+
+def _outdoes(better: Tried, other: Tried, is_apart: bool, rng: np.random.Generator) -> bool:
+    """Return whether of two loads what was fitted to surely prefers one, and what is held out, too.
+
+    Or that does not say otherwise: a load that depends on posture differs from a constant one by
+    little of what either takes off, and by less the less the arm goes about.
+    """
+    if not {better.candidate.effect.name, other.candidate.effect.name} <= _LOADS:
+        return False
+    if other.fit.cost - better.fit.cost < _FITTED_FAR_BETTER:
+        return False
+    margin = compare(better.held(is_apart), other.held(is_apart), rng)
+    return margin.gain < margin.error
 
 
 def _is_alike(

@@ -240,14 +240,36 @@ def test_a_counterbalance_and_a_constant_torque_are_rivals_unless_one_does_surel
     torque = searches.tried(ELBOW, _BAD, _GOOD)
     about = 0.01 + np.tile([-0.06, 0.06], 4)
     balance = searches.tried(Candidate(BALANCE, "elbow"), _BAD, _GOOD + about, numbers=2)
+    balance = replace(balance, fit=replace(balance.fit, cost=torque.fit.cost))
     assert _simplest([balance, torque], np.random.default_rng(0)) == (torque, (balance,))
-    surely = searches.tried(Candidate(BALANCE, "elbow"), _BAD, _GOOD + 0.05, numbers=2)
+    surely = replace(balance, losses=_GOOD + 0.05)
     assert _simplest([surely, torque], np.random.default_rng(0)) == (torque, ())
-    fit = replace(torque.fit, cost=balance.fit.cost)
-    better = replace(torque, fitted=_GOOD + 2.0, fit=fit), replace(balance, fitted=_GOOD)
+    better = replace(torque, fitted=_GOOD + 2.0), replace(balance, fitted=_GOOD)
     taken, rivals = _simplest(list(better), np.random.default_rng(0))
     assert taken is better[1]
     assert [one.candidate for one in rivals] == [ELBOW]
+
+
+@pytest.mark.parametrize(
+    ("worse", "less", "named", "is_tie"),
+    [
+        (0.0, 3.0, "torque_bias", True),
+        (0.0, 14.0, "counterbalance", False),
+        (0.035, 14.0, "torque_bias", True),  # held out it does 1.6 standard errors worse
+        (0.035, 3.0, "torque_bias", False),
+        (0.06, 14.0, "torque_bias", False),
+    ],
+)
+def test_what_was_fitted_to_has_a_say_in_which_of_two_loads_it_is(
+    searches: Searches, worse: float, less: float, named: str, is_tie: bool
+):
+    torque = searches.tried(ELBOW, _BAD, _GOOD)
+    about = worse + np.tile([-0.06, 0.06], 4)
+    balance = searches.tried(Candidate(BALANCE, "elbow"), _BAD, _GOOD + about, numbers=2)
+    balance = replace(balance, fit=replace(balance.fit, cost=torque.fit.cost - less))
+    taken, rivals = _simplest([balance, torque], np.random.default_rng(0))
+    assert taken.candidate.effect.name == named
+    assert bool(rivals) is is_tie
 
 
 def test_a_tilt_that_is_not_told_from_a_torque_is_its_rival_though_it_has_more_numbers(
