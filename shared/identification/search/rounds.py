@@ -6,7 +6,7 @@ from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
 from shared.identification.fitting.fit import Fit, go_down, polish
 from shared.identification.fitting.parameters import bends
-from shared.identification.fitting.refit import settle
+from shared.identification.fitting.refit import Rough, settle
 from shared.identification.fitting.space import Space
 from shared.identification.fitting.turns import LATE
 from shared.identification.gate.certainty import SURE, is_there
@@ -40,8 +40,11 @@ from shared.identification.search.searched import (
 
 _ROUNDS = 4
 """Each names one cause, and what is like it at other joints."""
-_FULL = 4
-"""Candidates that get a full fit, of those refitted roughly."""
+_FULL, _FULL_ALIKE = 4, 6
+"""Candidates that get a full fit, of those refitted roughly, and the most of which rough refits say
+too little to leave one out."""
+_SAY_LITTLE = 15.0
+"""Of the cost: by so much more than the best one's."""
 _FAR_OFF = 10.0
 """Mean square residual, in noise floors, of what was fitted to or held out, from which the base may
 be bent out of sight."""
@@ -147,10 +150,8 @@ def _round(
     for each in screened:
         found.screened.setdefault(each.candidate.label, each)
     tried: list[Tried] = []
-    for each in roughly[:_FULL]:
-        if each.ratio > min(1 - 1e-3, _FAR * roughly[0].ratio + 0.02):
-            break
-        progress("decide", len(tried) / _FULL, each.screened.candidate.label)
+    for each in _worth_a_fit(roughly, found.current.cost):
+        progress("decide", len(tried) / _FULL_ALIKE, each.screened.candidate.label)
         space = Space(found.problem, each.space.candidates)
         fit = settle(space, each.z, train, found.current)
         is_event = explains_event(each.screened.candidate, usual, off, fit, train)
@@ -184,6 +185,19 @@ def _round(
         space = Space(found.parts.space.problem, found.current.space.candidates)
         found.parts = polish(space, found.current.z, space.problem.of("train"), 2)
     return True
+
+
+def _worth_a_fit(roughly: list[Rough], cost: float) -> list[Rough]:
+    """Return which rough refits are followed by a full one.
+
+    Args:
+        roughly: best first.
+        cost: without any of them.
+    """
+    best = roughly[0].ratio if roughly else 0.0
+    good = [one for one in roughly if one.ratio <= min(1 - 1e-3, _FAR * best + 0.02)]
+    more = [one for one in good[_FULL:_FULL_ALIKE] if (one.ratio - best) * cost < _SAY_LITTLE]
+    return good[:_FULL] + more
 
 
 def _begun_anew(found: Search, one: Tried, train: tuple[int, ...]) -> Tried:

@@ -26,6 +26,7 @@ from shared.identification.dataset.types import Dataset, Float64
 from shared.identification.effect import Candidate
 from shared.identification.find import identify
 from shared.identification.fitting.fit import Fit, polish
+from shared.identification.fitting.refit import Rough
 from shared.identification.gate.certainty import SURE, sureness
 from shared.identification.gate.foretold import Foretold
 from shared.identification.gate.held_out import Taken
@@ -38,6 +39,7 @@ from shared.identification.search.rounds import (
     _is_useful,  # pyright: ignore[reportPrivateUsage]
     _simplest,  # pyright: ignore[reportPrivateUsage]
     _sure,  # pyright: ignore[reportPrivateUsage]
+    _worth_a_fit,  # pyright: ignore[reportPrivateUsage]
     search,
 )
 from shared.identification.search.searched import Tried
@@ -52,6 +54,26 @@ _GOOD = np.linspace(1.0, 1.2, 8)
 @pytest.fixture(scope="module")
 def searches(tmp_path_factory: pytest.TempPathFactory) -> Searches:
     return Searches(tmp_path_factory.mktemp("data"))
+
+
+@pytest.mark.parametrize(
+    ("ratios", "kept"),
+    [
+        ((0.5, 0.6, 0.7, 0.8, 0.9), 4),  # the first is far better than the fifth
+        ((0.5, 0.6, 1.1), 2),
+        ((0.1, 0.15, 0.9), 2),
+        ((0.990, 0.991, 0.992, 0.993, 0.9935, 0.9945, 0.9946), 6),  # none is told from the first
+        ((0.990, 0.991, 0.992, 0.993, 0.994, 0.9953), 5),  # 15.9 more of a cost of 3000
+        ((), 0),
+    ],
+)
+def test_rough_refits_that_say_little_leave_fewer_candidates_out(
+    searches: Searches, ratios: tuple[float, ...], kept: int
+):
+    one = searches.tried(ELBOW, _BAD, _GOOD)
+    roughly = [Rough(one.screened, one.fit.space, one.fit.z, ratio) for ratio in ratios]
+    cost = 3000.0
+    assert _worth_a_fit(roughly, cost) == roughly[:kept]
 
 
 def test_of_causes_that_do_as_well_the_one_of_fewer_numbers_is_taken(searches: Searches):
