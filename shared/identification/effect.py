@@ -40,6 +40,8 @@ class Quantity:
     """Where to look first. Of a number that says how, not how much, and means nothing while the
     others are 0: its probe is only what it is counted in. Or of an only number, not smooth, that
     acts from some size on."""
+    ends: tuple[bool, bool] = (False, False)
+    """Of such a number: whether the law is no longer this one at its lowest and at its highest."""
     least: float = 0.0
     """Below this size, either way, it is no more than what the simulation is off by itself."""
 

@@ -35,6 +35,7 @@ class JointSpring:
                 highest + joint.travel,
                 probe=0.5 * joint.travel,
                 grid=(joint.lowest, 0.5 * (joint.lowest + highest), highest),
+                ends=(True, True),  # so far off it is a constant torque rather
             ),
         )
 

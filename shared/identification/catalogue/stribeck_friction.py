@@ -28,6 +28,8 @@ class _Law:
 
 
 _LAW = _Law()
+_SLOWLY = 0.5
+"""Of the joint's fastest: what falls off over more than that is dry friction rather."""
 
 
 class StribeckFriction:
@@ -48,9 +50,10 @@ class StribeckFriction:
         return (
             Quantity("excess", joint.torque, 0.0, 2.0 * joint.drive, probe=0.1 * joint.drive),
             Quantity(
-                "falloff", f"{joint.angle}/s", 0.01 * joint.speed, joint.speed,
+                "falloff", f"{joint.angle}/s", 0.01 * joint.speed, _SLOWLY * joint.speed,
                 probe=0.1 * joint.speed,
                 grid=(0.03 * joint.speed, 0.1 * joint.speed, 0.3 * joint.speed),
+                ends=(False, True),
             ),
         )  # fmt: skip
 

@@ -265,7 +265,9 @@ def _is_useful(found: Search, one: Tried) -> bool:
     what is held out cannot tell that, see ``foretold.py``.
     """
     gain = one.gain
-    if one.is_of_the_simulation or not gain.is_useful(float(found.base_losses.mean())):
+    if one.is_of_the_simulation or one.is_of_another_law:
+        return False
+    if not gain.is_useful(float(found.base_losses.mean())):
         return False
     lasting = [each for each in found.accepted if not each.is_event]
     if not lasting or not found.problem.noise.is_white:

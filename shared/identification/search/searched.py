@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shared.identification.dataset.types import Float64
-from shared.identification.effect import Candidate
+from shared.identification.effect import Candidate, Quantity
 from shared.identification.fitting.fit import Fit, Start
 from shared.identification.fitting.problem import Problem, Variant
 from shared.identification.gate.certainty import sureness
@@ -31,6 +31,8 @@ STANDS_OUT = 6.0
 """Mean square residual of a stretch over the usual one, where something happened once."""
 TAKEN_AWAY = 0.4
 """Share of it that may be left by what explains it."""
+_AT_END = 0.02
+"""Of the range of a number: so near its end it is there."""
 
 
 _NO_LINKS = 100.0
@@ -89,11 +91,23 @@ class Tried:
     @property
     def is_of_the_simulation(self) -> bool:
         """Return whether it is so small that the simulation is off by as much itself."""
-        quantities = self.candidate.effect.quantities(
-            self.fit.space.problem.subject, self.candidate.place
+        return any(abs(value) < each.least for value, each in self._numbers)
+
+    @property
+    def is_of_another_law(self) -> bool:
+        """Return whether a number that says how is where the law is no longer this one."""
+        return any(
+            (each.ends[0] and value <= each.low + _AT_END * (each.high - each.low))
+            or (each.ends[1] and value >= each.high - _AT_END * (each.high - each.low))
+            for value, each in self._numbers
         )
+
+    @property
+    def _numbers(self) -> list[tuple[float, Quantity]]:
+        """Return its sizes as they were fitted, each with what it is."""
+        subject, place = self.fit.space.problem.subject, self.candidate.place
         values = self.fit.space.values(self.fit.z)[-1]
-        return any(abs(value) < each.least for value, each in zip(values, quantities, strict=True))
+        return list(zip(values, self.candidate.effect.quantities(subject, place), strict=True))
 
 
 def cosine(one: Tried, other: Tried) -> float:

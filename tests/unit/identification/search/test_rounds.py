@@ -17,13 +17,15 @@ from shared.identification.catalogue.command_latency import EFFECT as LATE
 from shared.identification.catalogue.counterbalance import EFFECT as BALANCE
 from shared.identification.catalogue.encoder_offset import EFFECT as ZERO
 from shared.identification.catalogue.gravity_tilt import EFFECT as TILT
+from shared.identification.catalogue.joint_spring import EFFECT as SPRING
 from shared.identification.catalogue.payload import EFFECT as PAYLOAD
 from shared.identification.catalogue.payload import OFF_CENTRE
 from shared.identification.catalogue.sample_and_hold import EFFECT as TURNS
+from shared.identification.catalogue.stribeck_friction import EFFECT as STICKS
 from shared.identification.catalogue.torque_bias import EFFECT as BIAS
 from shared.identification.catalogue.torque_gain import EFFECT as GAIN
 from shared.identification.dataset.types import Dataset, Float64
-from shared.identification.effect import Candidate
+from shared.identification.effect import Candidate, Effect
 from shared.identification.find import identify
 from shared.identification.fitting.fit import Fit, polish
 from shared.identification.fitting.refit import Rough
@@ -242,6 +244,27 @@ def test_a_delay_of_less_than_half_a_step_is_the_simulations(
     one = searches.tried(Candidate(LATE, ""), _BAD, _GOOD)
     z = one.fit.z.copy()
     z[-1] = of_step * searches.problem.subject.plant.timestep / 0.01  # of the delay's probe
+    one = replace(one, fit=replace(one.fit, z=z))
+    assert _is_useful(searches.search(_BAD), one) is is_useful
+
+
+@pytest.mark.parametrize(
+    ("effect", "at", "is_useful"),
+    [
+        (STICKS, 0.0, True),
+        (STICKS, 0.9, True),
+        (STICKS, 1.0, False),  # what falls off over half of all speeds is dry friction
+        (SPRING, 0.0, False),  # what rests that far off pulls alike everywhere
+        (SPRING, 0.5, True),
+        (SPRING, 0.99, False),
+    ],
+)
+def test_a_law_whose_form_is_at_its_end_is_another_one(
+    searches: Searches, effect: Effect, at: float, is_useful: bool
+):
+    one = searches.tried(Candidate(effect, "elbow"), _BAD, _GOOD, numbers=2)
+    z, (low, high) = one.fit.z.copy(), one.fit.space.bounds
+    z[-1] = low[-1] + at * (high[-1] - low[-1])
     one = replace(one, fit=replace(one.fit, z=z))
     assert _is_useful(searches.search(_BAD), one) is is_useful
 
