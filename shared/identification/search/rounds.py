@@ -52,6 +52,8 @@ _FAR = 2.0
 """Candidates whose rough refit costs so many times the best one's get no full fit."""
 QUIET = 1.25
 """Mean square residual, in noise floors, below which no further cause is looked for."""
+_MORE = 1.5
+"""Times as much as is foretold: more than that held-out motion seldom follows by chance."""
 _AFRESH = 8
 """Derivatives of further fits of what links could make up for."""
 _EVENT = 4.0
@@ -156,8 +158,7 @@ def _round(
         fit = settle(space, each.z, train, found.current)
         is_event = explains_event(each.screened.candidate, usual, off, fit, train)
         one = _tried(found, each.screened, fit, is_event)
-        is_hidden = not one.is_told and one.gain.gain > 0.0
-        tried.append(_begun_anew(found, one, train) if is_hidden else one)
+        tried.append(_begun_anew(found, one, train) if _is_in_a_valley(one) else one)
     for one in tried:
         found.tried.setdefault(one.candidate.label, one)
     useful = [one for one in tried if one.is_event or _is_useful(found, one)]
@@ -198,6 +199,15 @@ def _worth_a_fit(roughly: list[Rough], cost: float) -> list[Rough]:
     good = [one for one in roughly if one.ratio <= min(1 - 1e-3, _FAR * best + 0.02)]
     more = [one for one in good[_FULL:_FULL_ALIKE] if (one.ratio - best) * cost < _SAY_LITTLE]
     return good[:_FULL] + more
+
+
+def _is_in_a_valley(one: Tried) -> bool:
+    """Return whether a cause's size may be anything, as far as its fit has come.
+
+    Links could make up for it, or there is much more of it held out than what was fitted says.
+    """
+    is_more = one.foretold is not None and one.foretold.is_seen and one.foretold.share > _MORE
+    return one.gain.gain > 0.0 and (not one.is_told or is_more)
 
 
 def _begun_anew(found: Search, one: Tried, train: tuple[int, ...]) -> Tried:

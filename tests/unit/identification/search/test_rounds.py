@@ -37,6 +37,7 @@ from shared.identification.hidden.recipe import Recipe, wish_of
 from shared.identification.progress import silent
 from shared.identification.search.rounds import (
     _begun_anew,  # pyright: ignore[reportPrivateUsage]
+    _is_in_a_valley,  # pyright: ignore[reportPrivateUsage]
     _is_rival,  # pyright: ignore[reportPrivateUsage]
     _is_useful,  # pyright: ignore[reportPrivateUsage]
     _simplest,  # pyright: ignore[reportPrivateUsage]
@@ -146,6 +147,24 @@ def test_what_links_could_make_up_for_is_fitted_anew_from_where_it_was_seen(sear
     anew = _begun_anew(found, stuck, train)
     assert anew.fit.cost < 0.7 * stuck.fit.cost
     assert _begun_anew(found, anew, train) is anew
+
+
+@pytest.mark.parametrize(
+    ("foretold", "gain", "is_in_one"),
+    [
+        (None, 1.0, False),
+        (Foretold(0.5, 0.4, kept=0.05), 1.0, True),  # links make up for nearly all of it
+        (Foretold(0.5, 0.4, kept=0.05), -1.0, False),
+        (Foretold(2.5, 2.6, kept=0.3), 1.0, True),  # much more of it is there
+        (Foretold(2.5, 1.2, kept=0.3), 1.0, False),
+        (Foretold(0.9, 2.6, kept=0.3), 1.0, False),  # or it is by chance
+    ],
+)
+def test_a_size_is_not_settled_where_links_make_up_for_it_or_much_more_of_it_is_held_out(
+    searches: Searches, foretold: Foretold | None, gain: float, is_in_one: bool
+):
+    one = searches.tried(ELBOW, _BAD, _BAD - gain)
+    assert _is_in_a_valley(replace(one, foretold=foretold)) is is_in_one
 
 
 def test_what_links_could_make_up_for_is_fitted_from_the_model_file_too(searches: Searches):
