@@ -107,7 +107,7 @@ def limits(cost: Coefficients) -> str:
             "processor cores for actors",
             f"{number(1e6 * cost.actor_s)} us a sample: 8 learners need {8 * fed_by:.0f} cores",
             "physics on CPUs",
-            "actors on a GPU (`actor.backend = 'warp'`): 650,228 samples/s of one beside an H200",
+            "actors on a GPU (`actor.backend = 'warp'`): 523,923 samples/s of one beside an H200",
         ),
     )  # fmt: skip
     return table(("Limit", "Reached at", "Because", "Removed by"), rows)

@@ -53,10 +53,8 @@ CLOSE_SECONDS = 3.0
 MOST_RUNS = 64
 """Of one bus that are told apart."""
 LOG_FILTER = "error,zenoh::api::session=off"
-"""What Zenoh says on stdout, where RUST_LOG asks for nothing else.
-
-A session that is closed forgets its keys first, and calls what still comes for them an error.
-"""
+"""What Zenoh says on stdout, unless RUST_LOG says otherwise: nothing of what still comes for keys
+that a session forgot as it was closed, which it calls an error."""
 
 log = structlog.get_logger()
 
