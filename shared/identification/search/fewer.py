@@ -10,7 +10,8 @@ from shared.identification.fitting.fit import Fit, polish
 from shared.identification.fitting.space import Space
 from shared.identification.gate.certainty import is_there
 from shared.identification.gate.held_out import compare, stretches
-from shared.identification.search.searched import ALIKE, Model, Search, Tried, judged, so_far
+from shared.identification.search.judging import judged
+from shared.identification.search.searched import ALIKE, Model, Search, Tried, so_far
 
 
 def prune(found: Search, train: tuple[int, ...], test: tuple[int, ...]) -> None:

@@ -16,7 +16,8 @@ from shared.identification.gate.held_out import plain_stretches, stretches
 from shared.identification.leftover.phases import ONCE as ONE_TIME
 from shared.identification.search.bent import is_worse
 from shared.identification.search.fewer import take_back, without
-from shared.identification.search.searched import TAKEN_AWAY, Model, Search, Tried, judged, so_far
+from shared.identification.search.judging import judged
+from shared.identification.search.searched import TAKEN_AWAY, Model, Search, Tried, so_far
 from shared.identification.search.windows import within
 from shared.identification.verdict import Unexplained
 

@@ -11,8 +11,9 @@ from collections.abc import Callable
 import numpy as np
 
 from shared.identification.gate.held_out import stretches
+from shared.identification.search.judging import held_of
 from shared.identification.search.screen import Screened
-from shared.identification.search.searched import Search, held_of
+from shared.identification.search.searched import Search
 
 _SMALL = 0.02
 """Share of the training residual up to which what the screen expects is about what comes."""

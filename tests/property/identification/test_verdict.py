@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from shared.identification.conclusion.conclude import conclude
-from shared.identification.search.rounds import _simplest  # pyright: ignore[reportPrivateUsage]
+from shared.identification.search.rivals import simplest
 from tests.searches import DRAG, ELBOW, LIFT, OFFSET, Searches
 
 LOSSES = st.lists(st.floats(0.3, 300.0), min_size=6, max_size=6).map(np.array)
@@ -37,7 +37,7 @@ def test_causes_are_named_only_if_they_passed(
     names = ("mass elbow",) if doubted else ()
     passed = {each.candidate.label for each in useful}
     if useful:
-        taken, rivals = _simplest(useful, np.random.default_rng(0))
+        taken, rivals = simplest(useful, np.random.default_rng(0))
         before = (searches.tried(OFFSET, base, base),) if is_beside else ()  # passed earlier
         passed |= {each.candidate.label for each in before}
         found = searches.search(base, taken, rivals, names, tried, before)

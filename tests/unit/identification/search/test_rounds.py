@@ -35,12 +35,11 @@ from shared.identification.gate.held_out import Taken
 from shared.identification.hidden.generator import hide
 from shared.identification.hidden.recipe import Recipe, wish_of
 from shared.identification.progress import silent
+from shared.identification.search.rivals import is_rival, simplest
 from shared.identification.search.rounds import (
     _begun_anew,  # pyright: ignore[reportPrivateUsage]
     _is_in_a_valley,  # pyright: ignore[reportPrivateUsage]
-    _is_rival,  # pyright: ignore[reportPrivateUsage]
     _is_useful,  # pyright: ignore[reportPrivateUsage]
-    _simplest,  # pyright: ignore[reportPrivateUsage]
     _sure,  # pyright: ignore[reportPrivateUsage]
     _worth_a_fit,  # pyright: ignore[reportPrivateUsage]
     search,
@@ -82,7 +81,7 @@ def test_rough_refits_that_say_little_leave_fewer_candidates_out(
 def test_of_causes_that_do_as_well_the_one_of_fewer_numbers_is_taken(searches: Searches):
     best = searches.tried(DRAG, _BAD, _GOOD, numbers=3)
     simple = searches.tried(ELBOW, _BAD, _GOOD + 0.01)
-    taken, rivals = _simplest([best, simple], np.random.default_rng(0))
+    taken, rivals = simplest([best, simple], np.random.default_rng(0))
     assert taken is simple
     assert rivals == ()
 
@@ -97,14 +96,14 @@ def test_what_does_as_well_by_bending_links_further_is_not_taken_however_simple(
     z = simple.fit.z.copy()
     z[names.index("mass elbow")] = bend  # 2 or 6 standard deviations: 2 or 18 of the cost
     bent = replace(simple, fit=replace(simple.fit, z=z))
-    taken, _ = _simplest([best, bent], np.random.default_rng(0))
+    taken, _ = simplest([best, bent], np.random.default_rng(0))
     assert taken is (bent if is_taken else best)
 
 
 def test_causes_of_as_many_numbers_that_do_as_well_are_rivals(searches: Searches):
     one = searches.tried(ELBOW, _BAD, _GOOD + 0.01)
     other = searches.tried(LIFT, _BAD, _GOOD)
-    taken, rivals = _simplest([one, other], np.random.default_rng(0))
+    taken, rivals = simplest([one, other], np.random.default_rng(0))
     assert taken is other
     assert rivals == (one,)
 
@@ -112,7 +111,7 @@ def test_causes_of_as_many_numbers_that_do_as_well_are_rivals(searches: Searches
 def test_a_cause_that_does_surely_worse_is_no_rival_however_simple(searches: Searches):
     best = searches.tried(DRAG, _BAD, _GOOD, numbers=3)
     worse = searches.tried(ELBOW, _BAD, _GOOD + 2.0)
-    taken, rivals = _simplest([worse, best], np.random.default_rng(0))
+    taken, rivals = simplest([worse, best], np.random.default_rng(0))
     assert taken is best
     assert rivals == ()
 
@@ -123,10 +122,10 @@ def test_which_cause_does_best_is_judged_by_all_recordings(searches: Searches):
     little, fitted = 0.02 + 0.005 * rng.normal(size=8), 1.0 + 0.1 * rng.normal(size=24)
     much = searches.tried(DRAG, _BAD, _GOOD, numbers=3)
     simple = searches.tried(ELBOW, _BAD, _GOOD + little * 10.0)
-    assert _simplest([much, simple], rng)[0] is much
+    assert simplest([much, simple], rng)[0] is much
     more = fitted + 0.2 + 0.2 * rng.normal(size=24)
     both = replace(much, fitted=more), replace(simple, fitted=fitted)
-    assert _simplest(list(both), rng)[0] is both[1]
+    assert simplest(list(both), rng)[0] is both[1]
 
 
 def test_what_happened_once_has_no_large_say_in_which_cause_does_best(searches: Searches):
@@ -136,7 +135,7 @@ def test_what_happened_once_has_no_large_say_in_which_cause_does_best(searches: 
     right = replace(searches.tried(ELBOW, _BAD, _GOOD), fitted=fitted + event)
     wrong = replace(searches.tried(LIFT, _BAD, _GOOD + 0.3), fitted=fitted + 0.2 + 0.8 * event)
     assert wrong.everywhere().mean() < right.everywhere().mean()
-    assert _simplest([wrong, right], rng) == (right, ())
+    assert simplest([wrong, right], rng) == (right, ())
 
 
 def test_what_links_could_make_up_for_is_fitted_anew_from_where_it_was_seen(searches: Searches):
@@ -293,7 +292,7 @@ def test_turns_so_short_that_they_are_a_delay_are_a_rival_of_it(searches: Search
     about = 0.01 + np.tile([-0.06, 0.06], 4)  # better in one stretch, worse in the next
     turns = searches.tried(Candidate(TURNS, ""), _BAD, _GOOD + about, numbers=2)
     other = searches.tried(DRAG, _BAD, _GOOD + 0.01, numbers=2)
-    taken, rivals = _simplest([turns, late, other], np.random.default_rng(0))
+    taken, rivals = simplest([turns, late, other], np.random.default_rng(0))
     assert taken is late
     assert rivals == (turns,)
 
@@ -305,11 +304,11 @@ def test_a_counterbalance_and_a_constant_torque_are_rivals_unless_one_does_surel
     about = 0.01 + np.tile([-0.06, 0.06], 4)
     balance = searches.tried(Candidate(BALANCE, "elbow"), _BAD, _GOOD + about, numbers=2)
     balance = replace(balance, fit=replace(balance.fit, cost=torque.fit.cost))
-    assert _simplest([balance, torque], np.random.default_rng(0)) == (torque, (balance,))
+    assert simplest([balance, torque], np.random.default_rng(0)) == (torque, (balance,))
     surely = replace(balance, losses=_GOOD + 0.05)
-    assert _simplest([surely, torque], np.random.default_rng(0)) == (torque, ())
+    assert simplest([surely, torque], np.random.default_rng(0)) == (torque, ())
     better = replace(torque, fitted=_GOOD + 2.0), replace(balance, fitted=_GOOD)
-    taken, rivals = _simplest(list(better), np.random.default_rng(0))
+    taken, rivals = simplest(list(better), np.random.default_rng(0))
     assert taken is better[1]
     assert [one.candidate for one in rivals] == [ELBOW]
 
@@ -331,7 +330,7 @@ def test_what_was_fitted_to_has_a_say_in_which_of_two_loads_it_is(
     about = worse + np.tile([-0.06, 0.06], 4)
     balance = searches.tried(Candidate(BALANCE, "elbow"), _BAD, _GOOD + about, numbers=2)
     balance = replace(balance, fit=replace(balance.fit, cost=torque.fit.cost - less))
-    taken, rivals = _simplest([balance, torque], np.random.default_rng(0))
+    taken, rivals = simplest([balance, torque], np.random.default_rng(0))
     assert taken.candidate.effect.name == named
     assert bool(rivals) is is_tie
 
@@ -343,9 +342,9 @@ def test_a_tilt_that_is_not_told_from_a_torque_is_its_rival_though_it_has_more_n
     about = 0.01 + np.tile([-0.06, 0.06], 4)
     tilt = searches.tried(Candidate(TILT, ""), _BAD, _GOOD + about, numbers=2)
     tilt = replace(tilt, fit=replace(tilt.fit, cost=torque.fit.cost))
-    assert _simplest([tilt, torque], np.random.default_rng(0)) == (torque, (tilt,))
+    assert simplest([tilt, torque], np.random.default_rng(0)) == (torque, (tilt,))
     surely = replace(tilt, losses=_GOOD + 0.05)
-    assert _simplest([surely, torque], np.random.default_rng(0)) == (torque, ())
+    assert simplest([surely, torque], np.random.default_rng(0)) == (torque, ())
 
 
 def test_a_payload_beside_the_centre_and_an_encoders_zero_are_rivals_if_a_little_apart(
@@ -355,9 +354,9 @@ def test_a_payload_beside_the_centre_and_an_encoders_zero_are_rivals_if_a_little
     apart = 0.01 * float((_BAD - _GOOD).mean())
     heavy = searches.tried(Candidate(PAYLOAD, OFF_CENTRE), _BAD, _GOOD + apart, numbers=4)
     heavy = replace(heavy, fit=replace(heavy.fit, cost=zero.fit.cost))
-    assert _simplest([heavy, zero], np.random.default_rng(0)) == (zero, (heavy,))
+    assert simplest([heavy, zero], np.random.default_rng(0)) == (zero, (heavy,))
     further = replace(heavy, losses=_GOOD + 5.0 * apart)
-    assert _simplest([further, zero], np.random.default_rng(0)) == (zero, ())
+    assert simplest([further, zero], np.random.default_rng(0)) == (zero, ())
 
 
 @pytest.mark.parametrize(("apart", "are_rivals"), [(0.07, True), (0.15, False)])
@@ -369,7 +368,7 @@ def test_play_under_a_load_that_does_not_turn_round_and_an_encoders_zero_are_riv
     play = searches.tried(Candidate(PLAY, "elbow"), _BAD, worse)
     play = replace(play, fit=replace(play.fit, cost=zero.fit.cost))
     expected = (play,) if are_rivals else ()
-    assert _simplest([play, zero], np.random.default_rng(0)) == (zero, expected)
+    assert simplest([play, zero], np.random.default_rng(0)) == (zero, expected)
 
 
 def test_of_causes_that_are_followed_the_best_is_told_without_what_the_base_could_do(
@@ -379,7 +378,7 @@ def test_of_causes_that_are_followed_the_best_is_told_without_what_the_base_coul
     there = np.where(np.arange(8) % 3 == 0, 3.0, 0.0)
     right = searches.tried(ELBOW, _BAD, _GOOD + there)
     wrong = searches.tried(LIFT, _BAD, _GOOD + 0.5 * there + 0.3)
-    assert _simplest([right, wrong], np.random.default_rng(0))[0] is wrong
+    assert simplest([right, wrong], np.random.default_rng(0))[0] is wrong
 
     def followed(one: Tried, after: Float64) -> Tried:
         told = Foretold(9.0, 0.9, 1.0, _GOOD + 2.0, after)
@@ -389,23 +388,23 @@ def test_of_causes_that_are_followed_the_best_is_told_without_what_the_base_coul
     left = 1.2
 
     both = [followed(right, _GOOD), followed(wrong, _GOOD + 0.3)]
-    assert _simplest(both, np.random.default_rng(0)) == (both[0], ())
+    assert simplest(both, np.random.default_rng(0)) == (both[0], ())
     mixed = [both[0], wrong]  # of one it is not known
-    assert _simplest(mixed, np.random.default_rng(0))[0] is wrong
+    assert simplest(mixed, np.random.default_rng(0))[0] is wrong
     left = 9.0  # there the base would make up for what is large
     much = [followed(right, _GOOD), followed(wrong, _GOOD + 0.3)]
-    assert _simplest(much, np.random.default_rng(0))[0] is much[1]
+    assert simplest(much, np.random.default_rng(0))[0] is much[1]
 
 
 def test_what_explains_something_else_as_well_is_no_rival(searches: Searches):
     found, (train, test) = searches.search(_BAD), map(searches.problem.of, ("train", "test"))
     one = searches.tried(ELBOW, _BAD[:4], _GOOD[:4])  # stretches of what is held out
     other = searches.tried(LIFT, _BAD[:4], _GOOD[:4])
-    assert _is_rival(found, one, other, train, test)
+    assert is_rival(found, one, other, train, test)
     apart = replace(other, screened=replace(other.screened, signature=np.array([0.3, 0.95])))
-    assert not _is_rival(found, one, apart, train, test)
+    assert not is_rival(found, one, apart, train, test)
     turns = replace(apart.screened, candidate=Candidate(TURNS, ""))
-    assert _is_rival(found, one, replace(apart, screened=turns), train, test)
+    assert is_rival(found, one, replace(apart, screened=turns), train, test)
 
 
 @pytest.mark.parametrize(("more", "cost"), [(0.02, 1.0), (0.0, 1.2)])
@@ -415,7 +414,7 @@ def test_turns_that_do_surely_worse_than_a_delay_are_no_rival(
     late = searches.tried(Candidate(LATE, ""), _BAD, _GOOD)
     turns = searches.tried(Candidate(TURNS, ""), _BAD, _GOOD + more, numbers=2)
     worse = replace(turns, fit=replace(turns.fit, cost=cost * late.fit.cost + cost - 1.0))
-    assert _simplest([worse, late], np.random.default_rng(0)) == (late, ())
+    assert simplest([worse, late], np.random.default_rng(0)) == (late, ())
 
 
 def test_a_search_without_a_candidate_is_over(searches: Searches):

@@ -7,8 +7,9 @@ import pytest
 
 from shared.identification.fitting.fit import Fit
 from shared.identification.gate.foretold import Foretold
-from shared.identification.search import searched
-from shared.identification.search.searched import Model, foretells, judged
+from shared.identification.search import judging
+from shared.identification.search.judging import foretells, judged
+from shared.identification.search.searched import Model
 from tests.searches import ELBOW, Searches
 
 _USUAL = 1.0 + 0.2 * np.sin(np.arange(22.0))
@@ -74,8 +75,8 @@ def test_a_cause_is_followed_by_what_was_fitted_to_and_what_was_held_out_togethe
     searches = Searches(tmp_path)
     found = searches.search(_USUAL + 2.0)
     told = Foretold(errors, share, kept, _USUAL + 0.5, _USUAL)
-    monkeypatch.setattr(searched, "_foretold", lambda *rest: told)
-    monkeypatch.setattr(searched, "sureness", lambda *rest: fitted)
+    monkeypatch.setattr(judging, "_foretold", lambda *rest: told)
+    monkeypatch.setattr(judging, "sureness", lambda *rest: fitted)
     fit = _fitted(searches)
     gain, _, foretold = judged(
         found, ELBOW, Model(searches.base, _USUAL + 2.0), Model(fit, _USUAL)
