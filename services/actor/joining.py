@@ -31,8 +31,9 @@ from shared.errors import ConfigError
 from shared.messages.league import RunSettings, SettingsRequest
 from shared.messages.topics import SCHEDULE, SETTINGS
 from shared.runtime.files import atomic_write
-from shared.runtime.serve import ServeArgs, parse_args, plain_loop, stop_on_signals
+from shared.runtime.serve import ServeArgs, parse_args, plain_loop
 from shared.runtime.service import Health, Ticking
+from shared.runtime.stop import stop_on_signals
 
 Tables = dict[str, dict[str, Any]]
 

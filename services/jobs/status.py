@@ -21,13 +21,8 @@ from shared.clock import Clock, SystemClock
 from shared.errors import ConfigError
 from shared.messages.topics import STATUS
 from shared.runtime.files import atomic_write
-from shared.runtime.serve import (
-    ServeArgs,
-    certificates_override,
-    open_site_bus,
-    run_id_of,
-    stop_on_signals,
-)
+from shared.runtime.serve import ServeArgs, certificates_override, open_site_bus, run_id_of
+from shared.runtime.stop import stop_on_signals
 
 LISTEN_SECONDS = 2.3
 """Every process reports once a second; two reports tell its load."""

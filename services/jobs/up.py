@@ -19,7 +19,8 @@ from shared.config.site import load_section, nearest
 from shared.messages.training import Agent
 from shared.runtime.files import RunLock
 from shared.runtime.logging import configure_logging
-from shared.runtime.serve import run_id_of, stop_on_signals
+from shared.runtime.serve import run_id_of
+from shared.runtime.stop import stop_on_signals
 
 ROLES = (
     "router", "league", "learner", "actor", "recorder", "referee", "policy", "robot-io",

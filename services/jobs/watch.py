@@ -10,7 +10,7 @@ from pathlib import Path
 
 from shared.clock import SystemClock
 from shared.errors import ConfigError, RiposteError
-from shared.runtime.serve import stop_on_signals
+from shared.runtime.stop import stop_on_signals
 from shared.telemetry.door import FrontDoor, LiveView, read_live_view
 from shared.telemetry.rrd import recordings
 from shared.telemetry.viewer import WebViewer

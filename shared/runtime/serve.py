@@ -7,14 +7,12 @@ Exit codes: 0 told to stop; 1 did not stop in time; 2 bad input, do not start me
 import argparse
 import contextlib
 import dataclasses
-import faulthandler
 import json
 import os
 import re
-import signal
 import sys
 import threading
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar, get_args
 
@@ -32,13 +30,11 @@ from shared.runtime.build import commit
 from shared.runtime.logging import configure_logging
 from shared.runtime.process import set_process_name
 from shared.runtime.service import Ticking, run, version
+from shared.runtime.stop import stop_on_signals
 
 EXIT_BAD_INPUT = 2
 EXIT_BUG = 70
 EXIT_BUS_LOST = 75
-
-CLOSE_SECONDS = 15.0
-"""From the signal to stop to the end of the process, whatever it is doing."""
 
 S = TypeVar("S", bound=msgspec.Struct)
 T = TypeVar("T", bound=Ticking)
@@ -240,32 +236,6 @@ def serve_plain(
         return _say(args, f"bug: {what} (traceback in {log_path})", EXIT_BUG)
     log.info("service_stopped")
     return 0
-
-
-@contextlib.contextmanager
-def stop_on_signals(deadline: float = CLOSE_SECONDS) -> Generator[threading.Event]:
-    """Turn SIGTERM and SIGINT into an event; a second SIGINT, or the deadline, ends the process.
-
-    Past the deadline the tracebacks of all threads go to stderr and the exit code is 1, even when
-    a library holds the interpreter. Must be entered on the main thread.
-    """
-    stop = threading.Event()
-
-    def handle(number: int, _frame: object) -> None:
-        if stop.is_set():
-            if number == signal.SIGINT:
-                os._exit(128 + number)
-            return
-        stop.set()
-        faulthandler.dump_traceback_later(deadline, exit=True, file=sys.__stderr__ or sys.stderr)
-
-    before = {sig: signal.signal(sig, handle) for sig in (signal.SIGTERM, signal.SIGINT)}
-    try:
-        yield stop
-    finally:
-        faulthandler.cancel_dump_traceback_later()
-        for sig, handler in before.items():
-            signal.signal(sig, handler)
 
 
 def _say(args: ServeArgs, text: str, code: int) -> int:

@@ -24,7 +24,7 @@ from shared.config.site import nearest
 from shared.errors import ConfigError
 from shared.runtime.build import SOURCE_ROOT
 from shared.runtime.files import RunLock
-from shared.runtime.serve import stop_on_signals
+from shared.runtime.stop import stop_on_signals
 
 PAGE = Path("docs/reliability.md")
 TIMES = 20

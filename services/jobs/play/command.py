@@ -34,7 +34,8 @@ from shared.clock import SystemClock
 from shared.errors import RiposteError
 from shared.runtime.files import RunLock, atomic_write, require_free_space
 from shared.runtime.logging import configure_logging
-from shared.runtime.serve import EXIT_BAD_INPUT, stop_on_signals
+from shared.runtime.serve import EXIT_BAD_INPUT
+from shared.runtime.stop import stop_on_signals
 
 FREE_BYTES = 256 << 20
 """A match needs this much disk to begin with."""

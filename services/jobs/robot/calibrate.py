@@ -31,7 +31,8 @@ from shared.bus.base import Bus
 from shared.clock import Clock, SystemClock
 from shared.errors import RobotFault
 from shared.messages.topics import BATS, TRACKER_RAW
-from shared.runtime.serve import open_site_bus, stop_on_signals
+from shared.runtime.serve import open_site_bus
+from shared.runtime.stop import stop_on_signals
 
 POSES = 30
 HEARD_SECONDS = 10.0

@@ -21,7 +21,8 @@ from shared.clock import Clock, SystemClock
 from shared.config.site import nearest
 from shared.errors import ConfigError
 from shared.identification.excitation.reading import PosePlan, Stretch, read_programme
-from shared.runtime.serve import open_site_bus, stop_on_signals
+from shared.runtime.serve import open_site_bus
+from shared.runtime.stop import stop_on_signals
 
 WAIT_SECONDS = 0.01
 LINE_SECONDS = 5.0

@@ -31,7 +31,8 @@ from shared.config.site import load_section
 from shared.errors import ConfigError, StudyError
 from shared.runtime.files import RunLock, atomic_write, require_free_space
 from shared.runtime.logging import configure_logging
-from shared.runtime.serve import run_id_of, stop_on_signals
+from shared.runtime.serve import run_id_of
+from shared.runtime.stop import stop_on_signals
 from shared.study.dates import FLAG, date_problem, latest_known
 from shared.study.folder import Study, hash_of, open_study
 from shared.study.instants import clock_problem

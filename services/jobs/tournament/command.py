@@ -38,7 +38,7 @@ from shared.policy.snapshot import Fit
 from shared.runtime.build import commit
 from shared.runtime.files import RunLock, atomic_write, require_free_space
 from shared.runtime.logging import configure_logging
-from shared.runtime.serve import stop_on_signals
+from shared.runtime.stop import stop_on_signals
 from shared.sim.model import FencingModel
 
 MOST_BOUTS = 100_000

@@ -34,7 +34,7 @@ from shared.clock import Clock, SystemClock
 from shared.messages.training import AGENTS
 from shared.runtime.files import RunLock, atomic_write, require_free_space
 from shared.runtime.logging import configure_logging
-from shared.runtime.serve import stop_on_signals
+from shared.runtime.stop import stop_on_signals
 
 if TYPE_CHECKING:
     from services.jobs.train.dashboard import Dashboard
