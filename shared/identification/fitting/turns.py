@@ -9,6 +9,7 @@ absorb is taken out of the cost: the mean delay, which half of an interval makes
 interval does, and says little about it.
 """
 
+import itertools
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -51,8 +52,9 @@ _ABOUT = NEAR._replace(closer=1)
 _FEWEST, _MOST = 5, 256
 """Intervals tried first. Where it would take more, turns come so often that only their mean shows,
 and that is smooth."""
-_KEPT = 6
-"""Best ones that are looked at more closely."""
+_KEPT = (24, 12, 6, 4, 3)
+"""Best ones that are looked at more closely, of one part, of what is around it, and so on: one part
+alone prefers wrong ones by as much as what a phase that is off by a sixteenth of a turn costs."""
 _SAME = 10
 """Pairs are the same that are in the same one of so many parts of a step."""
 _AROUND = (-1.0, -0.5, 0.0, 0.5, 1.0)
@@ -155,11 +157,13 @@ def _sought(
     since = parts[telling].begin
     last = max(since, last - since)
     costs = cost([turning.at(z, *each, since) for each in tries], (telling,))
-    closer = 0
-    while True:
-        best: list[tuple[float, float]] = [tries[index] for index in np.argsort(costs)[:_KEPT]]
+    closer, apart = 0, (high / low) ** (1.0 / (count - 1)) - 1.0
+    for turn in itertools.count():
+        most = _KEPT[min(turn, len(_KEPT) - 1)]
+        best = _best(tries, costs, apart, wider, most)
         fine = _FINE * min(reach, last) * 2.0**closer
-        tries = _around(best, best[0][0] ** 2 / fine, wider)
+        apart = best[0][0] / fine
+        tries = _around(best, apart * best[0][0], wider)
         picked = tuple(
             segment for segment in segments if -reach < parts[segment].begin - since < reach
         )
@@ -170,6 +174,32 @@ def _sought(
         closer += reach >= last
         reach *= 2.0
         wider *= 0.5
+
+
+def _best(
+    tries: list[tuple[float, float]], costs: Float64, apart: float, wider: float, most: int
+) -> list[tuple[float, float]]:
+    """Return the pairs of least cost, none of which is the next one to a better one.
+
+    Args:
+        tries: intervals and phases.
+        costs: float64[T], theirs.
+        apart: from one interval to the next, as a share of it.
+        wider: from one phase to the next.
+        most: how many.
+    """
+    kept: list[tuple[float, float]] = []
+    for index in np.argsort(costs):
+        interval, phase = tries[index]
+        if len(kept) == most:
+            break
+        if not any(
+            abs(interval / one - 1.0) < 1.5 * apart
+            and abs((phase - other + 0.5) % 1.0 - 0.5) < 1.5 * wider
+            for one, other in kept
+        ):
+            kept.append((interval, phase))
+    return kept
 
 
 def _around(

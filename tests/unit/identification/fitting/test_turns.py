@@ -15,6 +15,7 @@ from shared.identification.fitting.turns import (
     NEAR,
     Turning,
     _around,  # pyright: ignore[reportPrivateUsage]
+    _best,  # pyright: ignore[reportPrivateUsage]
     aligned,
     turning_of,
 )
@@ -149,3 +150,10 @@ def test_what_lies_about_two_neighbours_is_looked_at_once():
     assert both[:15] == alone
     assert len(both) == 18  # of the second one, what is a whole step further
     assert len(_around([(0.02, 0.25), (0.023, 0.25)], 1e-4, 0.1)) == 30
+
+
+def test_a_neighbour_of_a_better_one_takes_no_place_of_another():
+    tries = [(0.02, 0.95), (0.02, 0.05), (0.02001, 0.95), (0.02, 0.5), (0.03, 0.95)]
+    costs = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+    assert _best(tries, costs, 1e-3, 0.1, 9) == [tries[0], tries[3], tries[4]]
+    assert _best(tries, costs[::-1], 1e-3, 0.1, 2) == [tries[4], tries[3]]
