@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.identification.baselines import baselines
+from benchmarks.identification.explainable import explainable
 from benchmarks.identification.judging import judged, record_of
 from benchmarks.identification.protocol import CELLS, Trial
 from shared.clock import SystemClock
@@ -130,6 +131,9 @@ def one(job: tuple[Trial, bool, float | None]) -> dict[str, Any] | None:
             record = record_of(trial, truth, finding.verdict, cpu_s)
             if trial.cell == "tie" and finding.verdict.ties:
                 record["is_told_apart"] = _is_told_apart(trial)
+            if trial.cell == "single" and not judged(record).has_place:
+                (hidden,) = truth.effect
+                record["explainable"] = explainable(dataset, hidden, trial.recipe.seed, steps)
         except RiposteError as error:
             return {"key": trial.key, "cell": trial.cell, "error": str(error), "commit": commit()}
         record["commit"] = commit()

@@ -5,7 +5,7 @@ import pytest
 from benchmarks.identification.judging import judged
 from benchmarks.identification.protocol import FIRST_SEED, protocol
 from benchmarks.identification.running import by_turns, finished, run
-from benchmarks.identification.table import checks_of, confusion, wilson
+from benchmarks.identification.table import checks_of, confusion, curve, taken_off, wilson
 from shared.sim.hidden.effect import hidden_effects
 
 
@@ -25,7 +25,7 @@ def record(cell="single", hidden=(), named=(), ties=(), verdict="named", key="k"
     return {
         "key": key, "cell": cell, "hidden": list(hidden), "named": list(named),
         "ties": [list(tie) for tie in ties], "verdict": verdict, "unexplained": unexplained,
-        "share_removed": 0.9, "cpu_s": 10.0,
+        "share_removed": 0.9, "cpu_s": 10.0, "base_fit": 2.0, "extended": 1.0,
     }  # fmt: skip
 
 
@@ -154,6 +154,21 @@ def test_rates_of_the_table_are_those_of_the_records():
         "payload": {"payload": 1, "(none)": 1},
         "(nothing)": {"(none)": 1, "payload": 1},
     }
+
+
+def test_an_effect_counts_by_what_it_takes_off_what_the_base_fit_leaves():
+    hidden = [effect("payload")]
+    right = record(hidden=hidden, named=[cause("payload")])
+    missed = record(hidden=hidden, verdict="none")
+    once = record(hidden=[effect("tracker_slip", "a")], named=[cause("tracker_slip", "a")])
+    records = [right, {**missed, "explainable": 0.01}, {**missed, "explainable": 0.3}]
+    assert [taken_off(each) for each in (*records, once)] == [0.5, 0.01, 0.3, 0.5]
+    (able,) = [check for check in checks_of(records) if "take 2% off" in check.name]
+    assert able.value == 0.5
+    assert able.name.endswith("(n = 2)")
+    assert [(each["to"], each["n"], each["named"]) for each in curve(records)] == [
+        (0.02, 1, 0.0), (0.4, 1, 0.0), (1.0, 1, 1.0),
+    ]  # fmt: skip
 
 
 def test_an_interval_of_a_rate_is_wilsons():
