@@ -3,7 +3,8 @@
 The protocol is in ``identification/protocol.py``; every finished data set is a line of
 ``runs/identify-COMMIT.jsonl``, so that a second call goes on. All of it takes hours; a share, or
 what is done in so many minutes: ``python -m benchmarks.identify --share 0.05 --minutes 30``, and
-with ``--skip`` others than those that code was mended by; ``--cells tie`` runs one part of it.
+with ``--skip`` others than those that code was mended by, or with ``--series 2`` the same of data
+sets that nobody has seen; ``--cells tie`` runs one part of it.
 """
 
 import argparse
@@ -42,6 +43,7 @@ def default_path() -> Path:
 def measured(
     path: Path, share: float, processes: int = PROCESSES, minutes: float | None = None,
     baselines_every: int = BASELINES_EVERY, skipped: int = 0, cells: Collection[str] = CELLS,
+    series: int = 1,
 ) -> Measurement:  # fmt: skip
     """Run a share of the protocol, or go on with it; 0 is the smoke test.
 
@@ -53,11 +55,12 @@ def measured(
         baselines_every: on every so many data sets the baselines run, too; 0: on none.
         skipped: so many data sets of the order are left out.
         cells: what is run of the others.
+        series: of the protocol's seeds.
 
     Raises:
         RiposteError: no data set, or of all cells none with one effect, was done in that time.
     """
-    trials = protocol(share) if share else smoke()
+    trials = protocol(share, series) if share else smoke()
     every = baselines_every if share else 0
     records = run(trials, path, every, processes, minutes, skipped, cells)
     first, *others = checks_of(records)
@@ -99,6 +102,10 @@ def main() -> int:
         "--cells", nargs="+", choices=CELLS, default=CELLS, metavar="CELL",
         help=f"of the protocol: {', '.join(CELLS)} (all)",
     )  # fmt: skip
+    parser.add_argument(
+        "--series", type=int, default=1, metavar="N",
+        help="of the protocol's seeds; 2 is of data sets that nobody has seen (%(default)s)",
+    )  # fmt: skip
     parser.add_argument("--write", action="store_true", help=f"add a row to benchmarks/{RESULTS}")
     found = parser.parse_args()
     if not 0.0 < found.share <= 1.0 or found.processes < 1:
@@ -109,11 +116,13 @@ def main() -> int:
         parser.error("--baselines-every is at least 0")
     if found.skip < 0:
         parser.error("--skip is at least 0")
+    if found.series < 1:
+        parser.error("--series is at least 1")
 
     def share() -> Measurement:
         return measured(
             found.out, found.share, found.processes, found.minutes, found.baselines_every,
-            found.skip, found.cells,
+            found.skip, found.cells, found.series,
         )  # fmt: skip
 
     try:

@@ -186,6 +186,15 @@ def test_the_protocol_has_every_effect_and_seeds_of_its_own():
     assert all(trial.without == {trial.recipe.wishes[0].name} for trial in outside)
 
 
+def test_another_series_asks_the_same_of_other_data_sets():
+    first, second = (by_turns(protocol(0.05, series)) for series in (1, 2))
+    assert not {each.recipe.seed for each in first} & {each.recipe.seed for each in second}
+    alike = [
+        [(each.cell, each.recipe.arm, each.recipe.wishes) for each in of] for of in (first, second)
+    ]
+    assert alike[0] == alike[1]
+
+
 def test_the_whole_protocol_has_the_numbers_of_the_issue():
     counts = {}
     for trial in protocol():
