@@ -9,7 +9,7 @@ from shared.identification.fitting.fit import Fit
 from shared.identification.gate.foretold import Foretold
 from shared.identification.search import judging
 from shared.identification.search.judging import foretells, judged
-from shared.identification.search.searched import Model
+from shared.identification.search.searched import Model, is_open
 from tests.searches import ELBOW, Searches
 
 _USUAL = 1.0 + 0.2 * np.sin(np.arange(22.0))
@@ -85,3 +85,18 @@ def test_a_cause_is_followed_by_what_was_fitted_to_and_what_was_held_out_togethe
     assert (gain.apart is not None) == is_followed
     assert gain.apart is None or gain.apart.gain == pytest.approx(0.5)
     assert gain.is_sure == is_sure
+
+
+@pytest.mark.parametrize(
+    ("left", "is_too_much"),
+    [(1.6, False), (3.4, False), (3.8, True)],  # of 30 floors, an eighth may be left
+)
+def test_beside_a_name_as_little_may_be_left_as_no_model_of_a_large_cause_is_without(
+    left: float, is_too_much: bool, tmp_path
+):
+    searches = Searches(tmp_path)
+    before, after = 30.0 * _USUAL / _USUAL.mean(), left * _USUAL / _USUAL.mean()
+    found = searches.search(before)
+    found.accepted.append(searches.tried(ELBOW, before, after))
+    found.current_losses = after
+    assert is_open(found) is is_too_much
