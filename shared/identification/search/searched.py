@@ -23,7 +23,7 @@ BESIDE_A_NAME = 1.7
 MAY_BE_LEFT = 0.12
 """Share of the base fit's mean square residual that named causes may leave where that is more:
 what is far larger than the noise is never modelled to the last digit. Large play or elasticity of a
-PR2 leaves 8 to 11 %; what is named for something that is not looked for, 18 % and more."""
+PR2 leaves 8 to 11 %; what is named for something that is not looked for, 23 % and more."""
 BESIDE_A_DOUBT = 10.0
 """The most that it may be where the base itself is doubted: more than that may hide anything."""
 STANDS_OUT = 6.0
