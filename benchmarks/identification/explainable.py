@@ -1,4 +1,4 @@
-"""What the hidden effect would explain, if it were known what and where it is.
+"""What the hidden effect explains, if it is known what and where it is.
 
 What a finder can be asked for: a base fit may make up for an effect that is large by itself.
 """

@@ -131,7 +131,7 @@ def one(job: tuple[Trial, bool, float | None]) -> dict[str, Any] | None:
             record = record_of(trial, truth, finding.verdict, cpu_s)
             if trial.cell == "tie" and finding.verdict.ties:
                 record["is_told_apart"] = _is_told_apart(trial)
-            if trial.cell == "single" and not judged(record).has_place:
+            if trial.cell == "single":
                 (hidden,) = truth.effect
                 record["explainable"] = explainable(dataset, hidden, trial.recipe.seed, steps)
         except RiposteError as error:

@@ -39,15 +39,14 @@ def checks_of(records: Sequence[dict[str, Any]]) -> tuple[Check, ...]:
     named = [each for each in single if each.has_place]
     errors = [error for each in named for error in each.errors]
     covered = [hit for each in named for hit in each.covered]
-    removed = [
-        record["share_removed"]
-        for record in done
-        if record["cell"] == "single" and judged(record).has_effect
+    of_able = [
+        record for record in done if record["cell"] == "single" and taken_off(record) >= LEAST
     ]
-    able = [
-        judged(record)
-        for record in done
-        if record["cell"] == "single" and taken_off(record) >= LEAST
+    able = [judged(record) for record in of_able]
+    removed = [
+        _removed(record)
+        for record, said in zip(of_able, able, strict=True)
+        if said.has_effect and record["hidden"][0]["name"] not in EVENTS
     ]
     found = [
         _rate("right effect", single, lambda each: each.has_effect, 0.90),
@@ -127,17 +126,27 @@ def curve(records: Sequence[dict[str, Any]]) -> list[dict[str, float]]:
 
 
 def taken_off(record: dict[str, Any]) -> float:
-    """Return the share of what the base fit leaves held out that the hidden effect takes off.
+    """Return the share of what the base fit leaves that the hidden effect takes off.
 
-    By what the finder found, where that is it; else by the same fit from the truth, see
-    ``explainable``. What happened once is not held out: what it makes of what was fitted to.
+    By a fit from the truth, see ``explainable``; in records of before there was one, by what the
+    finder made of it, and for an event by what it was sized to.
     """
     if "explainable" in record:
         return float(record["explainable"])
     (hidden,) = record["hidden"]
-    if hidden["name"] in EVENTS:
-        return float(hidden["share"])
-    return float(1.0 - record["extended"] / record["base_fit"])
+    return float(hidden["share"]) if hidden["name"] in EVENTS else _found(record)
+
+
+def _removed(record: dict[str, Any]) -> float:
+    """Return the share of what can be explained that the finder's model takes off, at most all."""
+    if "explainable" not in record:
+        return float(record["share_removed"])
+    return min(_found(record) / float(record["explainable"]), 1.0)
+
+
+def _found(record: dict[str, Any]) -> float:
+    """Return the share of what the base fit leaves held out that the finder's model takes off."""
+    return float(1.0 - (record["extended"] / record["base_fit"]) ** 2)
 
 
 def confusion_text(records: Sequence[dict[str, Any]]) -> str:

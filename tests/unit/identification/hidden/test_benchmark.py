@@ -162,13 +162,22 @@ def test_an_effect_counts_by_what_it_takes_off_what_the_base_fit_leaves():
     missed = record(hidden=hidden, verdict="none")
     once = record(hidden=[effect("tracker_slip", "a")], named=[cause("tracker_slip", "a")])
     records = [right, {**missed, "explainable": 0.01}, {**missed, "explainable": 0.3}]
-    assert [taken_off(each) for each in (*records, once)] == [0.5, 0.01, 0.3, 0.5]
+    assert [taken_off(each) for each in (*records, once)] == [0.75, 0.01, 0.3, 0.5]
     (able,) = [check for check in checks_of(records) if "take 2% off" in check.name]
     assert able.value == 0.5
     assert able.name.endswith("(n = 2)")
     assert [(each["to"], each["n"], each["named"]) for each in curve(records)] == [
         (0.02, 1, 0.0), (0.4, 1, 0.0), (1.0, 1, 1.0),
     ]  # fmt: skip
+
+
+def test_what_the_finder_explains_is_a_share_of_what_the_truth_does():
+    hidden = [effect("payload")]
+    right = record(hidden=hidden, named=[cause("payload")])
+    half, all_of_it = ({**right, "explainable": share} for share in (0.9, 0.7))
+    too_small = {**right, "explainable": 0.01, "extended": 2.0}
+    values = {check.name: check.value for check in checks_of([half, all_of_it, too_small])}
+    assert values["explainable removed, median"] == pytest.approx((0.75 / 0.9 + 1.0) / 2)
 
 
 def test_an_interval_of_a_rate_is_wilsons():
