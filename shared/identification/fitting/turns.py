@@ -9,7 +9,6 @@ absorb is taken out of the cost: the mean delay, which half of an interval makes
 interval does, and says little about it.
 """
 
-import itertools
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -157,8 +156,9 @@ def _sought(
     since = parts[telling].begin
     last = max(since, last - since)
     costs = cost([turning.at(z, *each, since) for each in tries], (telling,))
-    closer, apart = 0, (high / low) ** (1.0 / (count - 1)) - 1.0
-    for turn in itertools.count():
+    closer, turn = 0, 0
+    apart = float((high / low) ** (1.0 / (count - 1))) - 1.0
+    while True:
         most = _KEPT[min(turn, len(_KEPT) - 1)]
         best = _best(tries, costs, apart, wider, most)
         fine = _FINE * min(reach, last) * 2.0**closer
@@ -167,11 +167,12 @@ def _sought(
         picked = tuple(
             segment for segment in segments if -reach < parts[segment].begin - since < reach
         )
-        vectors = [space.clip(turning.at(z, *each, since)) for each in tries]
+        vectors = [space.clip(turning.at(z, interval, phase, since)) for interval, phase in tries]
         costs = cost(vectors, picked)
         if reach >= last and closer == about.closer:
             return vectors[int(np.argmin(costs))]
         closer += reach >= last
+        turn += 1
         reach *= 2.0
         wider *= 0.5
 
@@ -189,7 +190,8 @@ def _best(
         most: how many.
     """
     kept: list[tuple[float, float]] = []
-    for index in np.argsort(costs):
+    order: list[int] = np.argsort(costs).tolist()
+    for index in order:
         interval, phase = tries[index]
         if len(kept) == most:
             break
