@@ -20,9 +20,15 @@ from benchmarks.identification.judging import judged, record_of
 from benchmarks.identification.protocol import CELLS, Trial
 from shared.clock import SystemClock
 from shared.errors import RiposteError
+from shared.identification.catalogue import effects
+from shared.identification.dataset.types import Dataset
 from shared.identification.find import identify
+from shared.identification.fitting.saved import load
 from shared.identification.hidden.generator import hide, simulated
 from shared.identification.hidden.truth import read_truth
+from shared.identification.progress import silent
+from shared.identification.search.begin import begin
+from shared.identification.search.searched import Search
 from shared.runtime.build import commit
 from shared.runtime.process import THREAD_LIMITS
 
@@ -120,26 +126,36 @@ def one(job: tuple[Trial, bool, float | None]) -> dict[str, Any] | None:
         try:
             dataset = hide(data, trial.recipe)
             truth = read_truth(data)
-            begin = time.process_time()
+            started_at = time.process_time()
             finding = identify(
                 dataset,
                 seed=trial.recipe.seed,
                 resume_folder=steps,
                 without=tuple(sorted(trial.without)),
             )
-            cpu_s = time.process_time() - begin
+            cpu_s = time.process_time() - started_at
             record = record_of(trial, truth, finding.verdict, cpu_s)
             if trial.cell == "tie" and finding.verdict.ties:
                 record["is_told_apart"] = _is_told_apart(trial)
             if trial.cell == "single":
                 (hidden,) = truth.effect
-                record["explainable"] = explainable(dataset, hidden, trial.recipe.seed, steps)
+                begun = _begun(dataset, trial.recipe.seed, steps)
+                record["explainable"] = explainable(begun, hidden)
         except RiposteError as error:
             return {"key": trial.key, "cell": trial.cell, "error": str(error), "commit": commit()}
         record["commit"] = commit()
         if with_baselines:
-            record["baselines"] = baselines(dataset, trial.recipe.seed, steps)
+            begun = _begun(dataset, trial.recipe.seed, steps)
+            record["baselines"] = baselines(begun, trial.recipe.seed)
     return record
+
+
+def _begun(dataset: Dataset, seed: int, steps: Path) -> Search:
+    """Return a search whose base is what the finder fitted, as it kept that."""
+    return begin(
+        dataset, seed=seed, progress=silent, without=frozenset(), catalogue=effects(),
+        fits=load(steps, dataset, seed),
+    )  # fmt: skip
 
 
 def _is_told_apart(trial: Trial) -> bool:

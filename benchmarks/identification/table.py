@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.identification.explainable import EVENTS
 from benchmarks.identification.judging import Judged, judged
 from services.jobs.bench import Check
+from shared.identification.hidden.choosing import EVENTS
 
 _Z = 1.96
 SEEN = (-10.0, 0.02, 0.05, 0.1, 0.2, 0.4, 1.0)
@@ -39,20 +39,21 @@ def checks_of(records: Sequence[dict[str, Any]]) -> tuple[Check, ...]:
     named = [each for each in single if each.has_place]
     errors = [error for each in named for error in each.errors]
     covered = [hit for each in named for hit in each.covered]
-    of_able = [
-        record for record in done if record["cell"] == "single" and taken_off(record) >= LEAST
+    able = [
+        (record, judged(record))
+        for record in done
+        if record["cell"] == "single" and taken_off(record) >= LEAST
     ]
-    able = [judged(record) for record in of_able]
     removed = [
         _removed(record)
-        for record, said in zip(of_able, able, strict=True)
+        for record, said in able
         if said.has_effect and record["hidden"][0]["name"] not in EVENTS
     ]
     found = [
         _rate("right effect", single, lambda each: each.has_effect, 0.90),
         _rate(
             f"right effect, of those that take {LEAST:.0%} off what the base leaves",
-            able,
+            [said for _, said in able],
             lambda each: each.has_effect,
             0.90,
         ),

@@ -22,8 +22,8 @@ _DRAWS: Final = 12
 """Times that an effect is drawn anew which does not show enough."""
 _SHOWN: Final = 0.1
 """Of its power in held-out recordings, that an effect has to have in those to fit to."""
-_ONCE: Final = ("external_contact", "tracker_slip")
-"""Events: they are sized on the recordings to fit to."""
+EVENTS: Final = ("external_contact", "tracker_slip")
+"""They happen in one recording: they are sized on those to fit to."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class _Rulers:
 
     def of(self, name: str) -> Yardstick:
         """Return the yardstick for an effect."""
-        return self.on("train" if name in _ONCE else "test")
+        return self.on("train" if name in EVENTS else "test")
 
     def on(self, split: Split) -> Yardstick:
         """Return the yardstick on the recordings of a split."""
@@ -170,7 +170,7 @@ def _places(hidden: Hidden, scene: Scene) -> tuple[str, ...]:
         raise IdentificationError(
             f"{hidden.name} cannot be in {scene.arm.name}; leave it out, or choose another --arm"
         )
-    if hidden.name not in _ONCE:
+    if hidden.name not in EVENTS:
         return places
     twice = scene.trajectories[:2]
     found = tuple(

@@ -3,7 +3,6 @@ from pathlib import Path
 from benchmarks.identification.explainable import explainable
 from benchmarks.identification.protocol import smoke
 from shared.identification.catalogue import effects
-from shared.identification.fitting.saved import save
 from shared.identification.hidden.generator import hide
 from shared.identification.hidden.truth import read_truth
 from shared.identification.progress import silent
@@ -17,7 +16,6 @@ def test_what_a_hidden_effect_takes_off_is_known_without_a_search(tmp_path: Path
     found = begin(
         dataset, seed=recipe.seed, progress=silent, without=frozenset(), catalogue=effects()
     )
-    save(tmp_path / "steps", dataset, recipe.seed, found)
-    share = explainable(dataset, hidden, recipe.seed, tmp_path / "steps")
+    share = explainable(found, hidden)
     assert hidden.share is not None
     assert 0.5 * hidden.share < share < 1.0
