@@ -47,7 +47,7 @@ def checks_of(records: Sequence[dict[str, Any]]) -> tuple[Check, ...]:
     removed = [
         _removed(record)
         for record, said in able
-        if said.has_effect and record["hidden"][0]["name"] not in EVENTS
+        if "explainable" in record and said.has_effect and record["hidden"][0]["name"] not in EVENTS
     ]
     found = [
         _rate("right effect", single, lambda each: each.has_effect, 0.90),
@@ -140,8 +140,6 @@ def taken_off(record: dict[str, Any]) -> float:
 
 def _removed(record: dict[str, Any]) -> float:
     """Return the share of what can be explained that the finder's model takes off, at most all."""
-    if "explainable" not in record:
-        return float(record["share_removed"])
     return min(_found(record) / float(record["explainable"]), 1.0)
 
 

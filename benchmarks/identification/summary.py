@@ -1,0 +1,111 @@
+"""What the kept records of the protocol say together: a picture, and tables for a document.
+
+``python -m benchmarks.identification.summary docs/identify_results.md`` renews the tables between
+their two markers, and the picture beside them.
+"""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from benchmarks.harness import ROOT
+from benchmarks.identification.judging import Judged, judged
+from benchmarks.identification.running import finished
+from benchmarks.identification.table import checks_of, confusion, curve, wilson
+from services.jobs.bench import Check, figure
+from shared.errors import RiposteError
+from shared.messages.markdown import renewed
+from shared.telemetry.naming_figures import Outcome, Rate, naming
+
+BEGIN: Final = "<!-- protocol:begin -->"
+END: Final = "<!-- protocol:end -->"
+KEPT: Final = tuple(
+    ROOT / "benchmarks" / "identification" / name for name in ("records.jsonl", "series_2.jsonl")
+)
+PICTURE: Final = ROOT / "docs" / "images" / "identify_results.png"
+_GOAL: Final = 0.9
+
+
+def kept() -> list[dict[str, Any]]:
+    """Return the records of all series."""
+    return [record for path in KEPT for record in finished(path)]
+
+
+def described(records: Sequence[dict[str, Any]]) -> str:
+    """Return the goals and what was said of each effect, as Markdown tables."""
+    lines = ["| Figure | Goal | Measured |", "|---|---|---|"]
+    lines += [_row(check) for check in checks_of(records) if check.goal is not None]
+    lines += ["", "| Hidden | Named | Else |", "|---|---|---|"]
+    for name, row in confusion(records).items():
+        others = ", ".join(f"{said} {count}" for said, count in row.items() if said != name)
+        count = sum(row.values())
+        right = "" if name == "(nothing)" else f"{row.get(name, 0)} of {count}"
+        lines.append(f"| {name} | {right} | {others} |")
+    return "\n".join(lines)
+
+
+def _row(check: Check) -> str:
+    word = "at least" if check.goal_is == "at least" else "at most"
+    value = figure(check.value)
+    if check.low is not None and check.high is not None:
+        value += f" [{figure(check.low)}, {figure(check.high)}]"
+    bold = "**" if not check.is_met else ""
+    return f"| {check.name} | {word} {check.goal:g} | {bold}{value}{bold} |"
+
+
+def outcomes(records: Sequence[dict[str, Any]]) -> list[Outcome]:
+    """Return what was said of each effect, the one that is named most of all first."""
+    counts: dict[str, dict[str, int]] = {}
+    for record in records:
+        if "error" in record or record["cell"] != "single":
+            continue
+        found = judged(record)
+        of_it = counts.setdefault(found.hidden[0], {})
+        key = _key(found)
+        of_it[key] = of_it.get(key, 0) + 1
+    named = {name: row.get("right", 0) / sum(row.values()) for name, row in counts.items()}
+    order = sorted(counts, key=lambda name: (-named[name], name))
+    return [Outcome(name.replace("_", " "), counts[name]) for name in order]
+
+
+def _key(found: Judged) -> str:
+    if found.has_place:
+        return "right"
+    if found.has_tie and not found.has_effect:
+        return "tie"
+    return "no name" if found.said in ("(none)", "(unexplained)", "(base_too_coarse)") else "wrong"
+
+
+def rates(records: Sequence[dict[str, Any]]) -> list[Rate]:
+    """Return how often the right effect is named, by how much it takes off what the base leaves."""
+    found: list[Rate] = []
+    for each in curve(records):
+        count = round(each["n"])
+        interval = wilson(round(each["named"] * count), count)
+        found.append(Rate(each["from"], each["to"], each["named"], interval, count))
+    return found
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Renew the tables in a document, and the picture; return the exit code."""
+    words = sys.argv[1:] if argv is None else argv
+    if len(words) != 1:
+        sys.stderr.write("usage: python -m benchmarks.identification.summary FILE\n")
+        return 2
+    path, records = Path(words[0]), kept()
+    try:
+        old = path.read_text("utf-8")
+        new = renewed(old, BEGIN, END, described(records))
+        if new != old:
+            path.write_text(new, "utf-8")
+        PICTURE.write_bytes(naming(outcomes(records), rates(records), _GOAL))
+    except (OSError, UnicodeDecodeError, RiposteError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        sys.stderr.write(f"{path}: {reason}\n")
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
