@@ -8,15 +8,16 @@ from shared.identification.arm.places import moving, place_of
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.laws.series import link_inertia, seen_by_tracker, series
+from shared.identification.laws.gap import seen_by_tracker
+from shared.identification.laws.series import link_inertia, series
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure, series_name
 
 _PART = "gap"
 _LIGHT = 0.02
 """Of the link's inertia: armature of the gap, which keeps its contacts solvable."""
-_BRAKE = 1.0
-"""Damping in the gap over the link's inertia (1/s)."""
+_BRAKE = 0.1
+"""Damping in the gap over the link's inertia (1/s): its bearing's, which stops no link in a gap."""
 
 
 class Backlash:
@@ -58,13 +59,11 @@ class Backlash:
         row.field("jnt_solref")[joint] = 2.0 * row.plant.timestep, 1.0
         row.field("jnt_solimp")[joint, :2] = 0.999, 0.9999
         row.trust_encoders()
-        seen = seen_by_tracker(row, place)
+        seen = seen_by_tracker(row, place, half)
         if seen is None:
             row.rest(name, _Flank(half))
         else:  # where the load is near zero, it does not say on which flank the link lies
-            is_free = abs(seen.place) < half
-            begins = float(np.clip(seen.place, -half, half))
-            row.start(name, begins, seen.speed if is_free else 0.0)
+            row.start(name, seen.place, seen.speed)
 
 
 @dataclass(frozen=True)

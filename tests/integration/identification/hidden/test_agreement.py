@@ -28,10 +28,10 @@ EXACT = [
     ("arm3", "tracker_frame", "", 0.01, 0.02),
     ("torque2", "torque_gain", "elbow", 0.2, 0.03),
     ("pr2", "command_frame", "", 0.01, 0.02),
-    ("pr2", "sample_and_hold", "", 0.0123, 0.08),
-    ("pr2", "joint_elasticity", "elbow_flex", 3e-3, 0.1),
-    ("pr2", "backlash", "elbow_flex", 0.02, 0.08),
-    ("pr2", "encoder_offset", "elbow_flex", 0.03, 0.12),
+    ("pr2", "sample_and_hold", "", 0.0123, 0.05),
+    ("pr2", "joint_elasticity", "elbow_flex", 3e-3, 0.05),
+    ("pr2", "backlash", "elbow_flex", 0.03, 0.08),
+    ("pr2", "encoder_offset", "elbow_flex", 0.03, 0.1),
 ]
 """Arm, effect, place, size, limit."""
 DRIVES = [

@@ -127,7 +127,7 @@ def test_a_tracker_that_slips_is_off_from_a_time_on(tmp_path: Path, recording: s
 
 
 def test_play_of_a_gear_shows_after_reversals_of_the_load(tmp_path: Path) -> None:
-    found = left(hidden(tmp_path, BACKLASH, "pan", [0.02]))
+    found = left(hidden(tmp_path, BACKLASH, "pan", [0.01]))
     motor = [each for each in found if each.where == "pan"]
     link = [each for each in found if each.where == "pan, tracker"]
     assert {each.phase for each in motor} == {"after reversals of the load"}
