@@ -14,8 +14,7 @@ from benchmarks.identification.judging import Judged, judged
 from benchmarks.identification.running import finished
 from benchmarks.identification.table import checks_of, confusion, curve, wilson
 from services.jobs.bench import Check, figure
-from shared.errors import RiposteError
-from shared.messages.markdown import renewed
+from shared.messages.markdown import renew
 from shared.telemetry.naming_figures import Outcome, Rate, naming
 
 BEGIN: Final = "<!-- protocol:begin -->"
@@ -46,12 +45,11 @@ def described(records: Sequence[dict[str, Any]]) -> str:
 
 
 def _row(check: Check) -> str:
-    word = "at least" if check.goal_is == "at least" else "at most"
     value = figure(check.value)
     if check.low is not None and check.high is not None:
         value += f" [{figure(check.low)}, {figure(check.high)}]"
     bold = "**" if not check.is_met else ""
-    return f"| {check.name} | {word} {check.goal:g} | {bold}{value}{bold} |"
+    return f"| {check.name} | {check.goal_is} {check.goal:g} | {bold}{value}{bold} |"
 
 
 def outcomes(records: Sequence[dict[str, Any]]) -> list[Outcome]:
@@ -93,16 +91,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     if len(words) != 1:
         sys.stderr.write("usage: python -m benchmarks.identification.summary FILE\n")
         return 2
-    path, records = Path(words[0]), kept()
+    records = kept()
+    if not renew(Path(words[0]), BEGIN, END, described(records)):
+        return 2
     try:
-        old = path.read_text("utf-8")
-        new = renewed(old, BEGIN, END, described(records))
-        if new != old:
-            path.write_text(new, "utf-8")
         PICTURE.write_bytes(naming(outcomes(records), rates(records), _GOAL))
-    except (OSError, UnicodeDecodeError, RiposteError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        sys.stderr.write(f"{path}: {reason}\n")
+    except OSError as error:
+        sys.stderr.write(f"{PICTURE}: {error.strerror}\n")
         return 2
     return 0
 

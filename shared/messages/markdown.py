@@ -1,6 +1,9 @@
 """Documents in which a part is made from the code: it stands between two markers."""
 
-from shared.errors import ConfigError
+import sys
+from pathlib import Path
+
+from shared.errors import ConfigError, RiposteError
 
 
 def renewed(text: str, begin: str, end: str, made: str) -> str:
@@ -13,3 +16,17 @@ def renewed(text: str, begin: str, end: str, made: str) -> str:
     if first < 0 or last < first or text.count(begin) != 1 or text.count(end) != 1:
         raise ConfigError(f"expected one line {begin} and after it one line {end}")
     return f"{text[: first + len(begin)]}\n{made}\n{text[last:]}"
+
+
+def renew(path: Path, begin: str, end: str, made: str) -> bool:
+    """Renew what stands between a file's markers; say on standard error why not, if it failed."""
+    try:
+        old = path.read_text("utf-8")
+        new = renewed(old, begin, end, made)
+        if new != old:
+            path.write_text(new, "utf-8")
+    except (OSError, UnicodeDecodeError, RiposteError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        sys.stderr.write(f"{path}: {reason}\n")
+        return False
+    return True

@@ -7,8 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from shared.errors import RiposteError
-from shared.messages.markdown import renewed
+from shared.messages.markdown import renew
 from shared.telemetry.streams import DTYPES, STREAMS
 
 BEGIN = "<!-- columns:begin -->"
@@ -37,17 +36,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if len(words) != 1:
         sys.stderr.write("usage: python -m shared.telemetry.columns FILE\n")
         return 2
-    path = Path(words[0])
-    try:
-        old = path.read_text("utf-8")
-        new = renewed(old, BEGIN, END, describe())
-        if new != old:
-            path.write_text(new, "utf-8")
-    except (OSError, UnicodeDecodeError, RiposteError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        sys.stderr.write(f"{path}: {reason}\n")
-        return 2
-    return 0
+    return 0 if renew(Path(words[0]), BEGIN, END, describe()) else 2
 
 
 if __name__ == "__main__":
