@@ -15,7 +15,7 @@ from shared.identification.arm.slips import slip_of
 from shared.identification.arm.starts import Starts, starts_apart
 from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource, Trajectory
 from shared.sim.plant.inverse import inverse_dynamics
-from shared.sim.plant.plant import Control, Plant, finer, is_weightless, mjcf, pr2
+from shared.sim.plant.plant import Control, Plant, is_weightless, mjcf, pr2, stepped
 from shared.sim.plant.rollouts import Recorded, Rollouts
 from shared.sim.plant.signals import Signal
 
@@ -103,7 +103,7 @@ def plant_of(dataset: Dataset, source: ModelSource | None = None) -> Plant:
     if source.path is None:
         raise IdentificationError('[model] kind = "mjcf" needs path, the MJCF file')
     plant = mjcf(source.path, dataset.control, dataset.joints, dataset.actuators, source.tracked)
-    return plant if source.timestep is None else finer(plant, source.timestep)
+    return plant if source.timestep is None else stepped(plant, source.timestep)
 
 
 def subject_of(dataset: Dataset, capacity: int = 128) -> Subject:

@@ -262,9 +262,10 @@ def fit_base(space: Space, rng: np.random.Generator) -> BaseFits:
         index for index in problem.of("train") if problem.segments[index].trajectory == first
     )
     seed = int(rng.integers(1, 2**31 - 1))
+    rough = problem.subject.plant.rough_timestep  # does for a start
 
     def losses(zs: Float64) -> Float64:
-        found = space.residual([space.clip(z) for z in zs], segments)
+        found = space.residual([space.clip(z) for z in zs], segments, rough)
         return np.sum(np.minimum(found**2, 1e8), axis=1)
 
     origin = np.zeros(space.size)

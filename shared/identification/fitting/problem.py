@@ -17,6 +17,7 @@ from shared.identification.effect import Candidate
 from shared.identification.fitting.parameters import BaseParameter, enter_base
 from shared.identification.noise.floor import Noise
 from shared.sim.plant.inverse import model_of, reluctance
+from shared.sim.plant.plant import stepped
 from shared.sim.plant.rollouts import Entry, Reports, Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import pose_error, smoothed
@@ -26,6 +27,8 @@ BLOCK = 0.02
 """Residuals are averaged over this long: what a 50 Hz look at the arm would see (s)."""
 _POSTURES = 8
 """Of all recordings together, at which it is asked how hard the arm is to move."""
+_WITH_MORE = 64
+"""Arms at once, of those with what an effect compiles into them."""
 _SHORT = 0.15
 """For which a torque moves it then: half of a part (s)."""
 DIVERGED = 1e3
@@ -59,13 +62,16 @@ class Problem:
     uncounted: dict[int, NDArray[np.bool_]] = field(default_factory=dict[int, NDArray[np.bool_]])
     """bool[B] by segment: blocks that no loss counts, since something outside acted there."""
     segments: tuple[Segment, ...] = field(init=False)
-    _structures: dict[Structure, Rollouts] = field(default_factory=dict[Structure, Rollouts])
+    _arms: dict[tuple[Structure, float], Rollouts] = field(
+        default_factory=dict[tuple[Structure, float], Rollouts]
+    )
+    """Compiled, by what effects have added and by time step."""
     _bins: dict[int, tuple["_Bins", "_Bins | None"]] = field(init=False)
     _whitening: dict[int, Float64 | None] = field(init=False)
 
     def __post_init__(self) -> None:
         self.segments = segments_of(self.dataset, self.subject, self.window)
-        self._structures.setdefault((), self.subject.nominal)
+        self._arms.setdefault(((), self.subject.plant.timestep), self.subject.nominal)
         self._bins = {}
         self._whitening = {}
         for index, segment in enumerate(self.segments):
@@ -85,7 +91,7 @@ class Problem:
         """Return the same with recordings in parts that each start from the measured state."""
         return Problem(
             self.subject, self.dataset, self.parameters, self.noise, window,
-            _structures=self._structures,
+            _arms=self._arms,
         )  # fmt: skip
 
     def smooth(self) -> "Problem":
@@ -103,7 +109,7 @@ class Problem:
         """Return the same with more numbers in the base, after those that it has."""
         return Problem(
             self.subject, self.dataset, (*self.parameters, *more), self.noise, self.window,
-            self.uncounted, _structures=self._structures,
+            self.uncounted, _arms=self._arms,
         )  # fmt: skip
 
     def of(self, split: str) -> tuple[int, ...]:
@@ -123,27 +129,42 @@ class Problem:
         ]
         return tuple(dict.fromkeys(edits))
 
-    def reports(self, variants: Sequence[Variant], segments: Sequence[int]) -> list[list[Reports]]:
-        """Return what each variant would have logged, by variant and segment."""
+    def reports(
+        self, variants: Sequence[Variant], segments: Sequence[int], timestep: float | None = None
+    ) -> list[list[Reports]]:
+        """Return what each variant would have logged, by variant and segment.
+
+        Args:
+            variants: of the model.
+            segments: which they replay.
+            timestep: of the physics (s); the arm's own if None.
+        """
         groups: dict[Structure, list[int]] = defaultdict(list)
         for index, variant in enumerate(variants):
             groups[self.structure(variant)].append(index)
         out: list[list[Reports]] = [[] for _ in variants]
         for structure, members in groups.items():
-            if structure not in self._structures:
-                self._structures[structure] = Rollouts(self.subject.plant, structure, 64)
             work = [
                 (self.entry(variants[index]), self.segments[segment].recorded)
                 for index in members
                 for segment in segments
             ]
-            found = self._structures[structure].run(work)
+            found = self._compiled(structure, timestep).run(work)
             for position, index in enumerate(members):
                 out[index] = found[position * len(segments) : (position + 1) * len(segments)]
         return out
 
+    def _compiled(self, structure: Structure, timestep: float | None) -> Rollouts:
+        plant = self.subject.plant
+        key = structure, timestep or plant.timestep
+        if key not in self._arms:
+            capacity = _WITH_MORE if structure else self.subject.nominal.capacity
+            other = plant if timestep is None else stepped(plant, timestep)
+            self._arms[key] = Rollouts(other, structure, capacity)
+        return self._arms[key]
+
     def residuals(
-        self, variants: Sequence[Variant], segments: Sequence[int]
+        self, variants: Sequence[Variant], segments: Sequence[int], timestep: float | None = None
     ) -> list[list[Float64]]:
         """Return residuals in noise floors, by variant and segment: float64[B, C].
 
@@ -156,7 +177,9 @@ class Problem:
                 for report, segment in zip(reports, segments, strict=True)
             ]
             for weight, reports in zip(
-                map(self._weight, variants), self.reports(variants, segments), strict=True
+                map(self._weight, variants),
+                self.reports(variants, segments, timestep),
+                strict=True,
             )
         ]
 
@@ -224,14 +247,28 @@ class Problem:
         q = np.concatenate([each.q for each in self.dataset.trajectories])
         return q[:: max(len(q) // _POSTURES, 1)]
 
-    def vector(self, variants: Sequence[Variant], segments: Sequence[int]) -> Float64:
+    def vector(
+        self, variants: Sequence[Variant], segments: Sequence[int], timestep: float | None = None
+    ) -> Float64:
         """Return float64[V, M]: the residuals of each variant in one row."""
         return np.stack(
             [
                 np.concatenate([part.ravel() for part in parts])
-                for parts in self.residuals(variants, segments)
+                for parts in self.residuals(variants, segments, timestep)
             ]
         )
+
+    def moved(
+        self, variant: Variant, others: Sequence[Variant], segments: Sequence[int]
+    ) -> tuple[Float64, Float64]:
+        """Return residuals of a variant, float64[M], and how others differ, float64[V, M].
+
+        A longer step does for how they differ, where the arm has one: its error is in both.
+        """
+        rough = self.subject.plant.rough_timestep
+        found = self.vector([variant, *others], segments, rough)
+        own = found[0] if rough is None else self.vector([variant], segments)[0]
+        return own, found[1:] - found[0]
 
     def raw(self, reports: Reports, segment: int) -> tuple[Float64, Float64 | None]:
         """Return the residuals at every reading: float64[T, J] (rad, m) and float64[K, 6]."""

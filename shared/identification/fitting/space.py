@@ -100,9 +100,17 @@ class Space:
         """Return it with one more effect."""
         return Space(self.problem, (*self.candidates, candidate))
 
-    def residual(self, zs: list[Float64], segments: tuple[int, ...]) -> Float64:
-        """Return float64[V, M + n]: whitened residuals, and what speaks against leaving nominal."""
-        found = self.problem.vector([self.variant(z) for z in zs], segments)
+    def residual(
+        self, zs: list[Float64], segments: tuple[int, ...], timestep: float | None = None
+    ) -> Float64:
+        """Return float64[V, M + n]: whitened residuals, and what speaks against leaving nominal.
+
+        Args:
+            zs: where.
+            segments: of which recordings.
+            timestep: of the physics (s); the arm's own if None.
+        """
+        found = self.problem.vector([self.variant(z) for z in zs], segments, timestep)
         prior = np.stack([z / self.priors for z in zs])
         return np.concatenate([found, prior], axis=1)
 
@@ -118,14 +126,17 @@ class Space:
         """
         columns = range(self.size) if only is None else only
         steps = self._steps_at(z)
-        moved = [z]
+        moved: list[Float64] = []
         for column in columns:
             other = z.copy()
             other[column] += steps[column]
             moved.append(other)
-        found = self.residual(moved, segments)
-        picked = steps[list(columns)]
-        return found[0], (found[1:] - found[0]).T / picked
+        residual, change = self.problem.moved(
+            self.variant(z), [self.variant(each) for each in moved], segments
+        )
+        towards = (np.stack(moved) - z) / self.priors
+        found = np.concatenate([change, towards], axis=1)
+        return np.r_[residual, z / self.priors], found.T / steps[list(columns)]
 
     def _steps_at(self, z: Float64) -> Float64:
         """Return float64[n], of difference quotients at a vector, within bounds.

@@ -12,7 +12,7 @@ import numpy as np
 from shared.identification.dataset.types import Float64
 from shared.identification.fitting.fit import Fit
 from shared.identification.fitting.problem import Problem
-from shared.sim.plant.plant import finer
+from shared.sim.plant.plant import stepped
 from shared.sim.plant.rollouts import Rollouts
 
 _MUCH = 1.0
@@ -36,7 +36,7 @@ def changed_by(fit: Fit, timestep: float) -> Float64:
     """Return float64[J], by how much another time step (s) moves joints, in noise floors (RMS)."""
     problem, variant = fit.space.problem, fit.variant
     test = problem.of("test")
-    plant = finer(problem.subject.plant, timestep)
+    plant = stepped(problem.subject.plant, timestep)
     subject = replace(problem.subject, plant=plant, nominal=Rollouts(plant, (), len(test)))
     other = Problem(subject, problem.dataset, problem.parameters, problem.noise, problem.window)
     joints = len(subject.joints)

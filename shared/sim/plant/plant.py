@@ -31,6 +31,8 @@ _ALONE = int(_OFF.mjDSBL_CONTACT) | int(_OFF.mjDSBL_AUTORESET) | int(_OFF.mjDSBL
 PR2_TIMESTEP = 0.00125
 """Of identification, where training takes 10 ms (s). At 2.5 ms centrifugal torques are late by as
 much as small causes do, and a link in a gap stays at its flanks for 5 ms too long."""
+PR2_ROUGH = 2.0
+"""Steps in one that does for differences."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,8 @@ class Plant:
     """What the tracker and the payload are fixed to."""
     command: CommandParameters = field(default_factory=CommandParameters)
     """What is known to lie between a command and the controller."""
+    rough_timestep: float | None = None
+    """A longer step that does for what a change of the arm changes (s); None if there is none."""
 
     def mj_joint(self, label: str) -> str:
         """Return the MJCF's name of a logged joint."""
@@ -97,6 +101,7 @@ def pr2(
         base_body=f"{_AGENT}/torso",
         tool_body=f"{_AGENT}/wrist_roll",
         command=values.command,
+        rough_timestep=PR2_ROUGH * timestep,
     )
 
 
@@ -191,15 +196,19 @@ def mjcf(
     )
 
 
-def finer(plant: Plant, timestep: float) -> Plant:
-    """Return the same arm with another time step of its physics (s)."""
+def stepped(plant: Plant, timestep: float) -> Plant:
+    """Return the same arm with another time step of its physics (s).
+
+    If it is a shorter one, the arm's own does for what a change changes.
+    """
 
     def make() -> mujoco.MjSpec:
         spec = plant.make()
         spec.option.timestep = timestep
         return spec
 
-    return replace(plant, make=make, timestep=timestep)
+    rough = plant.timestep if timestep < plant.timestep else None
+    return replace(plant, make=make, timestep=timestep, rough_timestep=rough)
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,7 @@
 """The optimiser's vector: base first, then effects in probes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,8 @@ from shared.identification.catalogue.viscous_friction import EFFECT as VISCOUS
 from shared.identification.effect import Candidate
 from shared.identification.fitting.problem import Problem
 from shared.identification.fitting.space import Space
+from shared.sim.plant.plant import stepped
+from shared.sim.plant.rollouts import Rollouts
 from tests.measured import measure, problem_of
 
 
@@ -55,6 +59,29 @@ def test_a_derivative_is_what_a_small_step_changes(problem: Problem):
     moved[-1] = 0.1
     change = (space.residual([moved], train)[0] - residual) / 0.1
     assert np.allclose(change, jacobian[:, -1])
+
+
+def test_a_derivative_is_taken_by_a_longer_step_where_the_arm_has_one(problem: Problem):
+    def at(timestep: float) -> Space:
+        plant = stepped(problem.subject.plant, timestep)
+        subject = replace(problem.subject, plant=plant, nominal=Rollouts(plant, (), 8))
+        other = Problem(subject, problem.dataset, problem.parameters, problem.noise)
+        return Space(other, (Candidate(BIAS, "elbow"),))
+
+    train, own = problem.of("train"), problem.subject.plant.timestep
+    short, long = at(0.25 * own), Space(problem, (Candidate(BIAS, "elbow"),))
+    assert short.problem.subject.plant.rough_timestep == own
+    assert long.problem.subject.plant.rough_timestep is None
+    z = np.zeros(long.size)
+    residual, jacobian = short.jacobian(z, train)
+    np.testing.assert_array_equal(residual, short.residual([z], train)[0])
+    assert not np.allclose(residual, long.residual([z], train)[0], atol=0.01)
+    np.testing.assert_allclose(jacobian, long.jacobian(z, train)[1], atol=1e-9)
+
+
+def test_a_longer_step_is_none_for_what_a_change_changes(problem: Problem):
+    plant = problem.subject.plant
+    assert stepped(plant, 2.0 * plant.timestep).rough_timestep is None
 
 
 def test_what_is_known_beforehand_speaks_against_leaving_nominal(problem: Problem):
