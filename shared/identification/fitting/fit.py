@@ -23,6 +23,10 @@ _ENOUGH = 1e-3
 """A step that takes off less than this share of the cost is the last one."""
 _DAMPINGS = (1e-3, 1e-1, 1.0, 100.0)
 """Factors of Marquardt's damping that are tried at once."""
+_HARDLY = 1e-4
+"""Damping of a step that goes nearly to where the derivative says the bottom is."""
+_MUCH = 0.01
+"""A step that takes off more than this share of the cost needs no better derivative."""
 _MENDED = 6
 """The most steps with one derivative."""
 _NEARLY = 0.01
@@ -79,9 +83,9 @@ class Fit:
         return Fit(space, z, residual, jacobian, 0.5 * float(residual @ residual))
 
     @staticmethod
-    def at(space: Space, z: Float64, segments: tuple[int, ...]) -> "Fit":
-        """Return a vector as it is, with the derivative there."""
-        return Fit.of(space, z, *space.jacobian(z, segments))
+    def at(space: Space, z: Float64, segments: tuple[int, ...], is_rough: bool = False) -> "Fit":
+        """Return a vector as it is, with the derivative there, see :meth:`Space.jacobian`."""
+        return Fit.of(space, z, *space.jacobian(z, segments, is_rough=is_rough))
 
 
 def polish(
@@ -95,6 +99,7 @@ def polish(
     """Return a local fit by Levenberg-Marquardt steps within bounds.
 
     A derivative costs as much as many looks, so it is used for several steps, see :func:`go_down`.
+    A rough one does where a step takes much off; the last one never is.
 
     Args:
         space: what is fitted.
@@ -105,12 +110,15 @@ def polish(
         known: residual and derivative at the start, if they are known.
     """
     z = space.clip(start)
-    fit = Fit.at(space, z, segments) if known is None else Fit.of(space, z, *known)
-    for _ in range(steps):
+    is_rough = steps > 0 and space.has_rough(z)
+    fit = Fit.at(space, z, segments, is_rough) if known is None else Fit.of(space, z, *known)
+    for left in reversed(range(steps)):
         found = go_down(fit, segments, slight=_MANY * enough)
-        if not found.cost < fit.cost * (1 - enough):
+        if not is_rough and not found.cost < fit.cost * (1 - enough):
             break
-        fit = Fit.at(space, found.z, segments)
+        is_rough = is_rough and left > 0 and found.cost < fit.cost * (1 - _MUCH)
+        z = found.z if found.cost < fit.cost else fit.z
+        fit = Fit.at(space, z, segments, is_rough)
     return fit
 
 
@@ -127,7 +135,8 @@ def go_down(
         fit: where it begins, with the derivative there.
         segments: recordings to fit to.
         factors: of the damping, tried at once.
-        slight: a step that takes off less than this share of the cost is the last one.
+        slight: a step that takes off less than this share of the cost is the last one, if the
+            derivative promises no more.
     """
     space, z, residual, jacobian, cost = fit.space, fit.z, fit.residual, fit.jacobian, fit.cost
     damping = 1e-1
@@ -148,9 +157,16 @@ def go_down(
         is_enough = costs[best] > cost * (1 - slight)
         z, residual, cost = tries[best], found[best], float(costs[best])
         damping = max(dampings[best], 1e-4)
-        if is_enough:
+        if is_enough and promised(Fit(space, z, residual, jacobian, cost)) > cost * (1 - slight):
             break
     return Fit(space, z, residual, jacobian, cost)
+
+
+def promised(fit: Fit) -> float:
+    """Return the cost to which a step would come that is hardly damped, by the derivative."""
+    z = damped(fit.space, fit.z, fit.residual, fit.jacobian, [_HARDLY])[0]
+    left = fit.residual + fit.jacobian @ (z - fit.z)
+    return 0.5 * float(left @ left)
 
 
 def damped(
@@ -243,7 +259,7 @@ def fit_again(space: Space, saved: SavedFits) -> BaseFits:
     problem = space.problem
     parts = _on_parts(space)
     origin, pieces = np.zeros(space.size), parts.problem.of("train")
-    nominal = Start(origin, parts.jacobian(origin, pieces)[1])
+    nominal = Start(origin, parts.jacobian(origin, pieces, is_rough=True)[1])
     begun = Fit.at(parts, np.array(saved.parts), pieces)
     whole = Fit.at(space, np.array(saved.whole), problem.of("train"))
     return BaseFits(nominal, begun, replace(whole, starts_agree=saved.starts_agree))
@@ -300,7 +316,7 @@ def fit_with(space: Space, done: BaseFits, start: Float64) -> BaseFits:
     """
     parts, origin = _on_parts(space), np.zeros(space.size)
     pieces = parts.problem.of("train")
-    nominal = Start(origin, parts.jacobian(origin, pieces)[1])
+    nominal = Start(origin, parts.jacobian(origin, pieces, is_rough=True)[1])
     near = polish(parts, np.r_[done.parts.z, start], pieces, 6)
     is_same = parts.problem is space.problem
     begun = np.r_[done.whole.z, start]
@@ -321,7 +337,7 @@ def _fitted(space: Space, searched: Float64) -> BaseFits:
     segments = problem.of("train")
     parts, origin = _on_parts(space), np.zeros(space.size)
     pieces = parts.problem.of("train")
-    at_nominal = parts.jacobian(origin, pieces)
+    at_nominal = parts.jacobian(origin, pieces, is_rough=True)
     begun = polish(parts, origin, pieces, 6, known=at_nominal)
     is_same = parts.problem is problem
     first = begun if is_same else polish(space, begun.z, segments, 6)

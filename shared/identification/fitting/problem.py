@@ -258,14 +258,26 @@ class Problem:
             ]
         )
 
+    def rough_step(self, variant: Variant) -> float | None:
+        """Return a longer step that does for what a change of a variant changes (s), if one does.
+
+        Of an arm that rings on a spring none does: a derivative is off by a quarter there.
+        """
+        return None if self.structure(variant) else self.subject.plant.rough_timestep
+
     def moved(
-        self, variant: Variant, others: Sequence[Variant], segments: Sequence[int]
-    ) -> tuple[Float64, Float64]:
+        self, variant: Variant, others: Sequence[Variant], segments: Sequence[int],
+        is_rough: bool = False,
+    ) -> tuple[Float64, Float64]:  # fmt: skip
         """Return residuals of a variant, float64[M], and how others differ, float64[V, M].
 
-        A longer step does for how they differ, where the arm has one: its error is in both.
+        Args:
+            variant: where.
+            others: what it is held against.
+            segments: which they replay.
+            is_rough: whether differences may be those at a longer step, whose error both have.
         """
-        rough = self.subject.plant.rough_timestep
+        rough = self.rough_step(variant) if is_rough else None
         found = self.vector([variant, *others], segments, rough)
         own = found[0] if rough is None else self.vector([variant], segments)[0]
         return own, found[1:] - found[0]

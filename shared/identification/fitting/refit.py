@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.identification.dataset.types import Float64
-from shared.identification.fitting.fit import Fit, Start, damped, go_down
+from shared.identification.fitting.fit import Fit, Start, damped, go_down, promised
 from shared.identification.fitting.space import Space
 from shared.identification.fitting.turns import LIKELY, NEAR, aligned, turning_of
 from shared.identification.search.screen import Screened
@@ -124,7 +124,7 @@ def _mended(
     space: Space, z: Float64, cost: float, segments: tuple[int, ...]
 ) -> tuple[Float64, float]:
     """Return what one step with a derivative of its own comes to."""
-    residual, jacobian = space.jacobian(z, segments)
+    residual, jacobian = space.jacobian(z, segments, is_rough=True)
     tries = damped(space, z, residual, jacobian, list(_MENDING))
     costs = 0.5 * np.sum(space.residual(tries, segments) ** 2, axis=1)
     best = int(np.argmin(costs))
@@ -147,7 +147,7 @@ def _descend(
     costs = 0.5 * np.sum(found**2, axis=1)
     best = int(np.argmin(costs))
     z, residual = starts[best], found[best]
-    _, own = space.jacobian(z, segments, range(known, space.size))
+    _, own = space.jacobian(z, segments, range(known, space.size), is_rough=True)
     rows = len(residual) - space.size
     base = np.zeros((len(residual), known))
     base[:rows] = kept[:rows, :known]
@@ -202,9 +202,7 @@ def _is_straight(known: Fit, down: Fit) -> bool:
 
 def _is_there(fit: Fit) -> bool:
     """Return whether a fit's derivative, mended on the way, promises hardly anything more."""
-    z = damped(fit.space, fit.z, fit.residual, fit.jacobian, [_MENDING[0]])[0]
-    left = fit.residual + fit.jacobian @ (z - fit.z)
-    return 0.5 * float(left @ left) > fit.cost * (1 - _ENOUGH)
+    return promised(fit) > fit.cost * (1 - _ENOUGH)
 
 
 def _in_turn(fit: Fit, segments: tuple[int, ...]) -> Fit:

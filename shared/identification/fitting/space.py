@@ -114,15 +114,21 @@ class Space:
         prior = np.stack([z / self.priors for z in zs])
         return np.concatenate([found, prior], axis=1)
 
+    def has_rough(self, z: Float64) -> bool:
+        """Return whether a derivative at a vector may be a rough one, which costs half as much."""
+        return self.problem.rough_step(self.variant(z)) is not None
+
     def jacobian(
-        self, z: Float64, segments: tuple[int, ...], only: range | None = None
-    ) -> tuple[Float64, Float64]:
+        self, z: Float64, segments: tuple[int, ...], only: range | None = None,
+        is_rough: bool = False,
+    ) -> tuple[Float64, Float64]:  # fmt: skip
         """Return the residual float64[M + n] at a vector and its derivative float64[M + n, k].
 
         Args:
             z: where.
             segments: of which recordings.
             only: columns that are wanted; all if None.
+            is_rough: whether the derivative may be off by a few percent; the residual never is.
         """
         columns = range(self.size) if only is None else only
         steps = self._steps_at(z)
@@ -132,7 +138,7 @@ class Space:
             other[column] += steps[column]
             moved.append(other)
         residual, change = self.problem.moved(
-            self.variant(z), [self.variant(each) for each in moved], segments
+            self.variant(z), [self.variant(each) for each in moved], segments, is_rough
         )
         towards = (np.stack(moved) - z) / self.priors
         found = np.concatenate([change, towards], axis=1)

@@ -91,7 +91,9 @@ class Held:
         base = len(problem.parameters)
         z = np.concatenate([fit.z[:base], np.zeros(len(loose)), fit.z[base:]])
         space = Space(problem.freer(loose), fit.space.candidates)
-        jacobian = space.jacobian(z, self._test)[1][: -space.size] * self._counts[:, None]
+        jacobian = (
+            space.jacobian(z, self._test, is_rough=True)[1][: -space.size] * self._counts[:, None]
+        )
         basis, sizes, _ = np.linalg.svd(jacobian, full_matrices=False)
         self._basis = np.asarray(basis[:, sizes > _RANK * sizes[0]], np.float64)
 

@@ -63,7 +63,7 @@ def look(
     ]
     if is_far:
         progress("screen", 0.5, "again, from the nominal model")
-        far = Fit.at(fit.space, nominal.with_causes_of(fit), segments)
+        far = Fit.at(fit.space, nominal.with_causes_of(fit), segments, is_rough=True)
         known = {each.candidate for each, _ in picked}
         new = [
             each

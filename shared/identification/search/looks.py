@@ -102,7 +102,7 @@ def columns_of(
     moved = np.zeros((len(variants), len(fit.residual) - fit.space.size))
     if acted and variants:
         rows = np.flatnonzero(problem.rows_of(segments, acted))
-        moved[:, rows] = problem.moved(fit.variant, variants, acted)[1]
+        moved[:, rows] = problem.moved(fit.variant, variants, acted, is_rough=True)[1]
     out: dict[Candidate, list[Looked]] = {}
     begin = 0
     for candidate, each in looks.items():

@@ -154,10 +154,15 @@ class Bent:
     def clip(self, z: Float64) -> Float64:
         return z
 
+    def has_rough(self, z: Float64) -> bool:
+        return False
+
     def residual(self, zs: list[Float64], segments: tuple[int, ...]) -> Float64:
         return np.stack([np.r_[100.0 * (np.exp(z).sum() - 4.0), 5.0 * z, 50.0] for z in zs])
 
-    def jacobian(self, z: Float64, segments: tuple[int, ...]) -> tuple[Float64, Float64]:
+    def jacobian(
+        self, z: Float64, segments: tuple[int, ...], is_rough: bool
+    ) -> tuple[Float64, Float64]:
         self.derivatives += 1
         own = np.concatenate([100.0 * np.exp(z)[None], 5.0 * np.eye(2), np.zeros((1, 2))])
         return self.residual([z], segments)[0], own

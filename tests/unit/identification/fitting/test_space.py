@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shared.identification.catalogue.joint_elasticity import EFFECT as ELASTICITY
 from shared.identification.catalogue.torque_bias import EFFECT as BIAS
 from shared.identification.catalogue.viscous_friction import EFFECT as VISCOUS
 from shared.identification.effect import Candidate
@@ -61,7 +62,7 @@ def test_a_derivative_is_what_a_small_step_changes(problem: Problem):
     assert np.allclose(change, jacobian[:, -1])
 
 
-def test_a_derivative_is_taken_by_a_longer_step_where_the_arm_has_one(problem: Problem):
+def test_a_rough_derivative_is_taken_by_a_longer_step_where_the_arm_has_one(problem: Problem):
     def at(timestep: float) -> Space:
         plant = stepped(problem.subject.plant, timestep)
         subject = replace(problem.subject, plant=plant, nominal=Rollouts(plant, (), 8))
@@ -73,10 +74,24 @@ def test_a_derivative_is_taken_by_a_longer_step_where_the_arm_has_one(problem: P
     assert short.problem.subject.plant.rough_timestep == own
     assert long.problem.subject.plant.rough_timestep is None
     z = np.zeros(long.size)
-    residual, jacobian = short.jacobian(z, train)
+    assert short.has_rough(z)
+    assert not long.has_rough(z)
+    residual, jacobian = short.jacobian(z, train, is_rough=True)
     np.testing.assert_array_equal(residual, short.residual([z], train)[0])
     assert not np.allclose(residual, long.residual([z], train)[0], atol=0.01)
     np.testing.assert_allclose(jacobian, long.jacobian(z, train)[1], atol=1e-9)
+    _, fine = short.jacobian(z, train)
+    assert not np.allclose(jacobian, fine, rtol=1e-3)
+    assert np.linalg.norm(jacobian - fine) < 0.1 * np.linalg.norm(fine)
+
+
+def test_an_arm_that_rings_on_a_spring_has_no_rough_derivative(problem: Problem):
+    plant = replace(problem.subject.plant, rough_timestep=2.0 * problem.subject.plant.timestep)
+    subject = replace(problem.subject, plant=plant)
+    other = Problem(subject, problem.dataset, problem.parameters, problem.noise)
+    bare, ringing = Space(other), Space(other, (Candidate(ELASTICITY, "elbow"),))
+    assert bare.has_rough(np.zeros(bare.size))
+    assert not ringing.has_rough(np.zeros(ringing.size))
 
 
 def test_a_longer_step_is_none_for_what_a_change_changes(problem: Problem):
