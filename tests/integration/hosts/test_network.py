@@ -22,9 +22,13 @@ pytestmark = pytest.mark.skipif(bool(unavailable()), reason=unavailable())
 ECHO = (sys.executable, "-I", "-S", echo.__file__)
 NEVER_DONE = """
 import sys, time
+from pathlib import Path
 from shared.testing.network.hosts import Network
 host = Network().host("lost")
-print(host.namespace, host.start("sleep", "1000").pid, flush=True)
+pid = host.start("sleep", "1000").pid
+while Path(f"/proc/{pid}/comm").read_text() != "sleep\\n":  # then it is in the namespace
+    time.sleep(0.01)
+print(host.namespace, pid, flush=True)
 time.sleep(1000)
 """
 
