@@ -26,7 +26,8 @@ _DAMPINGS = (1e-3, 1e-1, 1.0, 100.0)
 _HARDLY = 1e-4
 """Damping of a step that goes nearly to where the derivative says the bottom is."""
 _MUCH = 0.01
-"""A step that takes off more than this share of the cost needs no better derivative."""
+"""A step that takes off more than this share of the cost needs no better derivative; a derivative
+that promises less than it is believed."""
 _MENDED = 6
 """The most steps with one derivative."""
 _NEARLY = 0.01
@@ -95,6 +96,7 @@ def polish(
     steps: int = _MAX_STEPS,
     enough: float = _ENOUGH,
     known: tuple[Float64, Float64] | None = None,
+    wanted: float = np.inf,
 ) -> Fit:
     """Return a local fit by Levenberg-Marquardt steps within bounds.
 
@@ -108,11 +110,14 @@ def polish(
         steps: the most derivatives after the first.
         enough: what takes off less than this share of the cost with a new derivative is the end.
         known: residual and derivative at the start, if they are known.
+        wanted: a fit whose derivative promises little more, and nothing below this cost, gives up.
     """
     z = space.clip(start)
     is_rough = steps > 0 and space.has_rough(z)
     fit = Fit.at(space, z, segments, is_rough) if known is None else Fit.of(space, z, *known)
     for left in reversed(range(steps)):
+        if not is_rough and promised(fit) > max(wanted, fit.cost * (1 - _MUCH)):
+            break
         found = go_down(fit, segments, slight=_MANY * enough)
         if not is_rough and not found.cost < fit.cost * (1 - enough):
             break

@@ -16,7 +16,7 @@ from shared.identification.arm.places import moving
 from shared.identification.conclusion.causes import motion, rival
 from shared.identification.conclusion.sentence import label
 from shared.identification.dataset.types import Float64
-from shared.identification.fitting.fit import WINDOW, Fit, go_down, promised
+from shared.identification.fitting.fit import WINDOW, Fit, go_down, polish
 from shared.identification.fitting.parameters import INERTIA_PRIOR, BaseParameter, base_parameters
 from shared.identification.fitting.problem import Problem
 from shared.identification.fitting.space import Space
@@ -43,8 +43,6 @@ _MOST = 0.5
 """Of what the best of them explains: what explains less gets none."""
 _STEPS, _ENOUGH = 12, 1e-4
 """Of a fit: what pulls a base back is a small part of the cost."""
-_AHEAD = 0.01
-"""A derivative that promises less than this share of the cost is believed."""
 _TOLD = 5
 """Parameters that are told as far from the model file."""
 _SPOILED = 1.2
@@ -77,7 +75,8 @@ def otherwise(found: Search, progress: Progress) -> Otherwise | None:
     for index, each in enumerate(instead):
         progress("refit", index / len(instead), each.candidate.label)
         space = base.space.grown(each.candidate)
-        fit = _along(space, np.r_[each.shift, each.start], base.cost - _SLIGHT)
+        start = np.r_[each.shift, each.start]
+        fit = polish(space, start, train, _STEPS, _ENOUGH, wanted=base.cost - _SLIGHT)
         losses = stretches(problem, space.variant(fit.z), test)
         is_sure = is_there(fit, each.candidate, train)
         if is_sure and _brings_back(base, fit) and not is_worse(losses, found.base_losses):
@@ -131,26 +130,6 @@ def _is_far(base: Fit) -> bool:
     """Return whether a base is far from the model file, by one number surely or by all of them."""
     is_off = _stays(base.space.problem) and _against(base) > _SLIGHT
     return is_off or bool(_surely_far(base))
-
-
-def _along(space: Space, begun: Float64, wanted: float) -> Fit:
-    """Return a fit that goes along a valley to its end, where little speaks against the base.
-
-    Args:
-        space: what is fitted.
-        begun: float64[n], where it begins.
-        wanted: the cost that it is to get below; one that sees that it does not gives up.
-    """
-    train = space.problem.of("train")
-    fit = Fit.at(space, space.clip(begun), train)
-    for _ in range(_STEPS):
-        if promised(fit) > max(wanted, (1.0 - _AHEAD) * fit.cost):
-            break
-        found = go_down(fit, train, slight=_ENOUGH)
-        if not found.cost < fit.cost * (1 - _ENOUGH):
-            break
-        fit = Fit.at(space, found.z, train)
-    return fit
 
 
 def _stays(problem: Problem) -> bool:

@@ -31,7 +31,7 @@ _ALONE = int(_OFF.mjDSBL_CONTACT) | int(_OFF.mjDSBL_AUTORESET) | int(_OFF.mjDSBL
 PR2_TIMESTEP = 0.00125
 """Of identification, where training takes 10 ms (s). At 2.5 ms centrifugal torques are late by as
 much as small causes do, and a link in a gap stays at its flanks for 5 ms too long."""
-PR2_ROUGH = 2.0
+_PR2_ROUGH = 2.0
 """Steps in one that does for differences."""
 
 
@@ -101,7 +101,7 @@ def pr2(
         base_body=f"{_AGENT}/torso",
         tool_body=f"{_AGENT}/wrist_roll",
         command=values.command,
-        rough_timestep=PR2_ROUGH * timestep,
+        rough_timestep=_PR2_ROUGH * timestep,
     )
 
 
