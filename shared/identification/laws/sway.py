@@ -39,7 +39,7 @@ class _Before:
     load: Float64
     """float64[T, B], what holds them still (N m)."""
     inertia: Float64
-    """float64[T, B, B] (kg m^2)."""
+    """float64[T, B, B], of what they carry (kg m^2)."""
 
 
 _Told = dict[tuple[tuple[str, ...], float], _Before | None]
@@ -64,9 +64,9 @@ def start_swaying(row: Row, names: Sequence[str], width: float) -> None:
     joints = [row.mj_joint(name) for name in names]
     dofs = [int(row.model.jnt_dofadr[joint]) for joint in joints]
     stiffness = row.field("jnt_stiffness")[joints]
-    more = row.field("dof_armature")[dofs] - row.model.dof_armature[dofs]
+    armature = row.field("dof_armature")[dofs]
     damping = row.field("dof_damping")[dofs]
-    state = _swung(before, tuple(stiffness), tuple(damping), tuple(more))
+    state = _swung(before, tuple(stiffness), tuple(damping), tuple(armature))
     for name, place, speed in zip(names, *np.split(state, 2), strict=True):
         row.start(name, float(place), float(speed))
 
@@ -76,11 +76,11 @@ def _swung(
     before: _Before,
     stiffness: tuple[float, ...],
     damping: tuple[float, ...],
-    more: tuple[float, ...],
+    armature: tuple[float, ...],
 ) -> Float64:
     """Return float64[2 B], positions and then speeds at time 0 (rad, rad/s)."""
     count = len(stiffness)
-    inverse = np.linalg.inv(before.inertia + np.diag(more))
+    inverse = np.linalg.inv(before.inertia + np.diag(armature))
     flow = np.zeros((len(before.at), 2 * count, 2 * count))
     flow[:, :count, count:] = np.eye(count)
     flow[:, count:, :count] = -inverse * np.array(stiffness)

@@ -89,16 +89,18 @@ def held_still(
         qdd: float64[T, J] (rad/s^2, m/s^2).
 
     Returns:
-        float64[T, B], the torque, and float64[T, B, B], the inertia that they would turn.
+        float64[T, B], the torque, and float64[T, B, B], the inertia that they would turn, without
+        their own armature, which goes by the time step.
     """
     own = np.array([int(model.joint(name).dofadr[0]) for name in names])
+    armature = np.diag(model.dof_armature[own])
     load = np.empty((len(q), len(own)))
     inertia = np.empty((len(q), len(own), len(own)))
     whole = np.empty((model.nv, model.nv))
     for index, data in enumerate(_inverted(plant, model, q, qd, qdd)):
         load[index] = data.qfrc_inverse[own]
         mujoco.mj_fullM(model, data, whole)
-        inertia[index] = whole[np.ix_(own, own)]
+        inertia[index] = whole[np.ix_(own, own)] - armature
     return load, inertia
 
 

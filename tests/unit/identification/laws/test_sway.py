@@ -11,6 +11,7 @@ from shared.identification.catalogue.base_compliance import EFFECT as GIVES
 from shared.identification.catalogue.joint_elasticity import EFFECT as BENDS
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Effect
+from shared.sim.plant.plant import stepped
 from shared.sim.plant.rollouts import Recorded, Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal, pose_error
@@ -78,6 +79,21 @@ def test_what_begins_with_the_recording_begins_at_rest(rollouts: Rollouts):
     row = rollouts.entered(gives, recorded(swing, seconds=1.0))
     assert row.speeds == {}
     assert set(row.rests) == {"base/about_x", "base/about_y"}
+
+
+def test_how_it_sways_is_not_that_of_a_run_at_a_longer_step(
+    tmp_path: Path, rollouts: Rollouts, whole: tuple[Recorded, Float64, Float64]
+):
+    """What the motion took of it is worked out once; the springs' armature goes by the step."""
+    asked, q, _ = whole
+    subject = make_subject(stepped(rollouts.plant, 4.0 * rollouts.plant.timestep))
+    rough = Rollouts(subject.plant, GIVES.structure(subject, ""), 1)
+    later = part(asked, q)
+    same = replace(later, logged_q=Signal(later.logged_q.at, later.logged_q.values))
+    rough.run([(gives, later)])
+    after, alone = (rollouts.entered(gives, each) for each in (later, same))
+    assert after.speeds == pytest.approx(alone.speeds, rel=1e-6)
+    assert alone.speeds
 
 
 def test_too_short_a_motion_says_nothing(
