@@ -113,7 +113,7 @@ def polish(
         wanted: a fit whose derivative promises little more, and nothing below this cost, gives up.
     """
     z = space.clip(start)
-    is_rough = steps > 0 and space.has_rough(z)
+    is_rough = steps > 0 and space.has_rough
     fit = Fit.at(space, z, segments, is_rough) if known is None else Fit.of(space, z, *known)
     for left in reversed(range(steps)):
         if not is_rough and promised(fit) > max(wanted, fit.cost * (1 - _MUCH)):
@@ -283,7 +283,7 @@ def fit_base(space: Space, rng: np.random.Generator) -> BaseFits:
         index for index in problem.of("train") if problem.segments[index].trajectory == first
     )
     seed = int(rng.integers(1, 2**31 - 1))
-    rough = problem.subject.plant.rough_timestep  # does for a start
+    rough = problem.rough_timestep  # does for a start
 
     def losses(zs: Float64) -> Float64:
         found = space.residual([space.clip(z) for z in zs], segments, rough)

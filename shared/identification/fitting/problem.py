@@ -258,12 +258,10 @@ class Problem:
             ]
         )
 
-    def rough_step(self, variant: Variant) -> float | None:
-        """Return a longer step that does for what a change of a variant changes (s), if one does.
-
-        Of an arm that rings on a spring none does: a derivative is off by a quarter there.
-        """
-        return None if self.structure(variant) else self.subject.plant.rough_timestep
+    @property
+    def rough_timestep(self) -> float | None:
+        """Return a longer step that does for what a change of the arm changes (s), if one does."""
+        return self.subject.plant.rough_timestep
 
     def moved(
         self, variant: Variant, others: Sequence[Variant], segments: Sequence[int],
@@ -277,7 +275,7 @@ class Problem:
             segments: which they replay.
             is_rough: whether differences may be those at a longer step, whose error both have.
         """
-        rough = self.rough_step(variant) if is_rough else None
+        rough = self.rough_timestep if is_rough else None
         found = self.vector([variant, *others], segments, rough)
         own = found[0] if rough is None else self.vector([variant], segments)[0]
         return own, found[1:] - found[0]

@@ -114,9 +114,10 @@ class Space:
         prior = np.stack([z / self.priors for z in zs])
         return np.concatenate([found, prior], axis=1)
 
-    def has_rough(self, z: Float64) -> bool:
-        """Return whether a derivative at a vector may be a rough one, which costs half as much."""
-        return self.problem.rough_step(self.variant(z)) is not None
+    @property
+    def has_rough(self) -> bool:
+        """Return whether a derivative may be a rough one, which costs half as much."""
+        return self.problem.rough_timestep is not None
 
     def jacobian(
         self, z: Float64, segments: tuple[int, ...], only: range | None = None,

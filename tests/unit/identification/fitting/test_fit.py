@@ -147,15 +147,13 @@ class Bent:
 
     size = 2
     bounds = (np.full(2, -5.0), np.full(2, 5.0))
+    has_rough = False
 
     def __init__(self) -> None:
         self.derivatives = 0
 
     def clip(self, z: Float64) -> Float64:
         return z
-
-    def has_rough(self, z: Float64) -> bool:
-        return False
 
     def residual(self, zs: list[Float64], segments: tuple[int, ...]) -> Float64:
         return np.stack([np.r_[100.0 * (np.exp(z).sum() - 4.0), 5.0 * z, 50.0] for z in zs])
