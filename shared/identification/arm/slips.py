@@ -1,5 +1,11 @@
-"""When a tracker may have slipped, from the tracker and the encoders alone."""
+"""When a tracker may have slipped, from the tracker and the encoders alone.
 
+Two looks: at the clearest step within a second or two of one recording, and at the instants after
+which the tracker sits elsewhere on the hand in all recordings than it did before. The second one
+shows slips of a millimetre, which readings of a second do not.
+"""
+
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +21,32 @@ _WINDOWS = ((0.25, 4.0), (1.0, 2.6))
 long one shows a step that is hardly more than a reading is off by, a short one what is fast."""
 _FEWEST = 5
 """Readings of a window."""
+_MOST = 6
+"""Instants of all recordings after which the tracker may sit elsewhere, the likeliest."""
+_APART = 0.4
+"""Instants of one recording are as far from each other (s)."""
+_LASTS = 40.0
+"""Of the square of a lasting step in its standard errors, from which it is worth a look. White
+noise alone comes to some 16, noise that drifts to 60."""
+_BLOCK = 0.1
+"""For standard errors: what noise is like within it is all the same (s)."""
+_RANK = 1e-6
+"""Of the largest singular value: what is less changes nothing."""
+
+
+def slips_of(rollouts: Rollouts, recordings: Sequence[Trajectory]) -> dict[str, tuple[float, ...]]:
+    """Return the likeliest instants by recording, on the tracker's clock (s).
+
+    Args:
+        rollouts: of the arm as the model has it.
+        recordings: of it, in the order of recording; only those to fit to are looked at.
+    """
+    seen = [each for each in recordings if each.split == "train"]
+    found = {each.name: [slip_of(rollouts, each)] for each in seen}
+    for name, at in _lasting(rollouts, seen):
+        found[name].append(at)
+    known = {name: sorted({at for at in times if at is not None}) for name, times in found.items()}
+    return {name: tuple(times) for name, times in known.items() if times}
 
 
 def slip_of(rollouts: Rollouts, recording: Trajectory) -> float | None:
@@ -27,9 +59,7 @@ def slip_of(rollouts: Rollouts, recording: Trajectory) -> float | None:
     if recording.tracker_at is None or recording.tracker is None:
         return None
     at = recording.tracker_at
-    q = sampled(recording.joints_at, recording.q, at)
-    expected = tool_poses(rollouts.plant, rollouts.model, q)
-    off = rotated(conjugate(expected[:, 3:]), recording.tracker[:, :3] - expected[:, :3])
+    off, _ = _in_hand(rollouts, recording, at, recording.tracker)
     period = float(np.median(np.diff(at)))
     looks = [
         _looked(off, max(_FEWEST, round(length / period)), clear) for length, clear in _WINDOWS
@@ -39,6 +69,66 @@ def slip_of(rollouts: Rollouts, recording: Trajectory) -> float | None:
         return None
     edge = _sharpened(off, found.edge, found.length)
     return 0.5 * float(at[edge - 1] + at[edge])
+
+
+def _in_hand(
+    rollouts: Rollouts, recording: Trajectory, at: Float64, tracker: Float64
+) -> tuple[Float64, Float64]:
+    """Return where a tracker is beside where it should be in the hand's frame, and what bends that.
+
+    Returns:
+        float64[K, 3] (m), and float64[K, 2 J + 4] of the posture and the hand's velocity, in which
+        wrong encoders, links and clocks are about linear.
+    """
+    q = sampled(recording.joints_at, recording.q, at)
+    expected = tool_poses(rollouts.plant, rollouts.model, q)
+    to_hand = conjugate(expected[:, 3:])
+    off = rotated(to_hand, tracker[:, :3] - expected[:, :3])
+    velocity = rotated(to_hand, np.gradient(expected[:, :3], at, axis=0))
+    return off, np.column_stack([np.ones(len(at)), np.sin(q), np.cos(q), velocity])
+
+
+def _lasting(rollouts: Rollouts, recordings: Sequence[Trajectory]) -> list[tuple[str, float]]:
+    """Return recordings and instants after which a tracker sits elsewhere, the likeliest first."""
+    seen = [
+        (each.name, each.tracker_at, *_in_hand(rollouts, each, each.tracker_at, each.tracker))
+        for each in recordings
+        if each.tracker_at is not None and each.tracker is not None
+        if len(each.tracker_at) >= 2 * _FEWEST
+    ]
+    if not seen:
+        return []
+    off, bends = (np.concatenate([each[part] for each in seen]) for part in (2, 3))
+    at = np.concatenate([each[1] for each in seen])
+    which = np.repeat(np.arange(len(seen)), [len(each[1]) for each in seen])
+    is_first = np.r_[True, np.diff(which) > 0]
+    size = np.where(is_first, 0.0, _lasting_steps(off, bends, at))
+    found: list[tuple[str, float]] = []
+    while len(found) < _MOST and size.max() >= _LASTS:
+        edge = int(np.argmax(size))
+        found.append((seen[which[edge]][0], 0.5 * float(at[edge - 1] + at[edge])))
+        size[(which == which[edge]) & (np.abs(at - at[edge]) < _APART)] = 0.0
+    return found
+
+
+def _lasting_steps(off: Float64, bends: Float64, at: Float64) -> Float64:
+    """Return float64[K], how sure a step is from each reading on: its square in standard errors.
+
+    Args:
+        off: float64[K, 3], in the order of recording.
+        bends: float64[K, N], what the rest of it may be a sum of.
+        at: float64[K], of one recording after the other (s).
+    """
+    basis, sizes, _ = np.linalg.svd(bends / np.linalg.norm(bends, axis=0), full_matrices=False)
+    basis = basis[:, sizes > _RANK * sizes[0]]
+    left = off - basis @ (basis.T @ off)
+    count = max(round(_BLOCK / float(np.median(np.diff(at)))), 1)
+    blocks = left[: len(left) // count * count].reshape(-1, count, off.shape[1]).mean(axis=1)
+    variance = count * np.mean(blocks**2, axis=0)
+    later, shown = (np.cumsum(each[::-1], axis=0)[::-1] for each in (left, basis))
+    own = np.arange(len(off), 0, -1) - np.sum(shown**2, axis=1)
+    is_told = own > _FEWEST
+    return np.where(is_told, np.sum(later**2 / variance, axis=1) / np.maximum(own, 1.0), 0.0)
 
 
 class _Look(NamedTuple):

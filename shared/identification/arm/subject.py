@@ -11,7 +11,7 @@ from shared.identification.arm.known_efforts import known_effort_of
 from shared.identification.arm.motion import motion_of
 from shared.identification.arm.parts import CUTS, tracker_of
 from shared.identification.arm.ripples import ripples_of
-from shared.identification.arm.slips import slip_of
+from shared.identification.arm.slips import slips_of
 from shared.identification.arm.starts import Starts, starts_apart
 from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource, Trajectory
 from shared.sim.plant.inverse import inverse_dynamics
@@ -56,14 +56,9 @@ class Subject:
         return ripples_of(self.nominal, self.recordings)
 
     @functools.cached_property
-    def slips(self) -> dict[str, float]:
+    def slips(self) -> dict[str, tuple[float, ...]]:
         """Return when the tracker may have slipped, by recording to fit to (s, its own clock)."""
-        found = {
-            each.name: slip_of(self.nominal, each)
-            for each in self.recordings
-            if each.split == "train"
-        }
-        return {name: at for name, at in found.items() if at is not None}
+        return slips_of(self.nominal, self.recordings)
 
     @functools.cached_property
     def starts(self) -> Starts:

@@ -13,8 +13,8 @@ from shared.sim.plant.structure import Structure
 class TrackerSlip:
     """A step of the tool offset from one instant on, in all recordings made after it, too.
 
-    The instant is looked for near the one at which tracker and encoders, without any simulation,
-    part by the clearest step. A slip while a held-out recording was made cannot be fitted, and one
+    The instant is looked for near those at which tracker and encoders, without any simulation,
+    part by the clearest steps. A slip while a held-out recording was made cannot be fitted, and one
     between two recordings is a ``tool_offset`` of some of them.
     """
 
@@ -29,10 +29,10 @@ class TrackerSlip:
 
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
         """Return the way in the hand's frame, and when, on the tracker's clock."""
-        at = subject.slips.get(place, 0.5 * subject.duration)
+        times = subject.slips.get(place, (0.5 * subject.duration,))
         return (
             *(Quantity(axis, "m", -0.1, 0.1, probe=0.005) for axis in "xyz"),
-            Quantity("time", "s", 0.0, max(subject.duration, at), probe=0.1, grid=(at,)),
+            Quantity("time", "s", 0.0, max(subject.duration, *times), probe=0.1, grid=times),
         )
 
     def structure(self, subject: Subject, place: str) -> Structure:

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shared.identification.arm.slips import slip_of
+from shared.identification.arm.slips import slip_of, slips_of
 from shared.identification.arm.subject import Subject
 from shared.identification.catalogue.tracker_slip import EFFECT
 from shared.identification.dataset.types import Float64, Trajectory
@@ -24,13 +24,16 @@ def _waving(at: Float64) -> Float64:
     return np.stack([0.8 * np.sin(2 * at), 0.3 * np.sin(3 * at), 0.5 * np.sin(2.5 * at)], axis=1)
 
 
-def _seen(subject: Subject, slip_at: float, noise: float, lag: float = 0.0) -> Trajectory:
-    """Return a recording of 6 s whose tracker moves by 5 mm in the hand at an instant."""
-    rng = np.random.default_rng(5)
+def _seen(
+    subject: Subject, slip_at: float, noise: float, lag: float = 0.0, part: float = 1.0,
+    seed: int = 5,
+) -> Trajectory:  # fmt: skip
+    """Return a recording of 6 s whose tracker moves by 5 mm, or a part, in the hand at a time."""
+    rng = np.random.default_rng(seed)
     at: Float64 = np.arange(0.0, 6.0, 0.01)
     tracker = tool_poses(subject.plant, subject.nominal.model, _waving(at - lag))
     late = at >= slip_at
-    tracker[late, :3] += rotated(tracker[late, 3:], np.array(WAY))
+    tracker[late, :3] += rotated(tracker[late, 3:], part * np.array(WAY))
     tracker[:, :3] += noise * rng.standard_normal((len(at), 3))
     q = _waving(at)
     return Trajectory(
@@ -64,7 +67,7 @@ def test_noise_alone_is_no_slip(subject: Subject):
     assert slip_of(subject.nominal, _seen(subject, 100.0, 0.5e-3)) is None
 
 
-def test_a_slip_is_looked_for_once_in_each_recording_to_fit_to(subject: Subject):
+def test_a_slip_is_looked_for_in_each_recording_to_fit_to(subject: Subject):
     slipped, smooth = _seen(subject, 2.0, 0.3e-3), _seen(subject, 100.0, 0.3e-3)
     later = replace(_seen(subject, 4.0, 0.3e-3), name="fast")
     held_out = replace(slipped, name="other", split="test")
@@ -72,9 +75,30 @@ def test_a_slip_is_looked_for_once_in_each_recording_to_fit_to(subject: Subject)
     found = replace(subject, recordings=recordings)
     assert EFFECT.places(found) == ("slow", "fast")
     times = [EFFECT.quantities(found, place)[3].grid for place in ("slow", "fast")]
-    np.testing.assert_allclose(times, [[1.995], [3.995]])
+    assert [
+        min(abs(np.array(each) - at)) for each, at in zip(times, (1.995, 3.995), strict=True)
+    ] == pytest.approx([0.0, 0.0], abs=1e-9)
     assert EFFECT.places(replace(subject, recordings=(smooth,))) == ()
     assert EFFECT.places(replace(subject, recordings=recordings, has_tracker=False)) == ()
+
+
+def test_a_slip_too_small_to_see_in_a_second_is_timed_by_how_it_lasts(subject: Subject):
+    recordings = [
+        replace(_seen(subject, at, 2.5e-3, part=0.25, seed=seed), name=name)
+        for seed, (name, at) in enumerate([("first", 100.0), ("second", 2.5), ("third", 0.0)], 10)
+    ]
+    assert slip_of(subject.nominal, recordings[1]) is None
+    found = slips_of(subject.nominal, recordings)
+    assert min(abs(at - 2.5) for at in found["second"]) < 0.1
+    assert sum(len(times) for times in found.values()) <= 6
+
+
+def test_where_it_stays_put_no_slip_is_looked_for(subject: Subject):
+    recordings = [
+        replace(_seen(subject, 100.0, 2.5e-3, lag=0.015, seed=seed), name=f"{seed}")
+        for seed in range(4)
+    ]
+    assert slips_of(subject.nominal, recordings) == {}
 
 
 def test_the_tracker_is_off_from_the_slip_on(subject: Subject):
