@@ -13,7 +13,7 @@ from benchmarks.harness import ROOT
 from benchmarks.identification.judging import Judged, judged
 from benchmarks.identification.running import finished
 from benchmarks.identification.table import checks_of, confusion, curve, wilson
-from services.jobs.bench import Check, figure
+from services.jobs.bench import figure
 from shared.messages.markdown import renew
 from shared.telemetry.naming_figures import Outcome, Rate, naming
 
@@ -31,10 +31,20 @@ def kept() -> list[dict[str, Any]]:
     return [record for path in KEPT for record in finished(path)]
 
 
+def newest(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the records of the code that ran last, on data sets that no code had seen."""
+    commit = records[-1].get("commit") if records else None
+    return [record for record in records if record.get("commit") == commit]
+
+
 def described(records: Sequence[dict[str, Any]]) -> str:
     """Return the goals and what was said of each effect, as Markdown tables."""
-    lines = ["| Figure | Goal | Measured |", "|---|---|---|"]
-    lines += [_row(check) for check in checks_of(records) if check.goal is not None]
+    last = newest(records)
+    rows = _rows(records)
+    now = _rows(last)
+    lines = [f"| Figure | Goal | All {len(records)} | The last {len(last)} |", "|---|---|---|---|"]
+    lines += [f"| {name} | {goal} | {value} | {now.get((name, goal), '')} |"
+              for (name, goal), value in rows.items()]  # fmt: skip
     lines += ["", "| Hidden | Named | Else |", "|---|---|---|"]
     for name, row in confusion(records).items():
         others = ", ".join(f"{said} {count}" for said, count in row.items() if said != name)
@@ -44,12 +54,20 @@ def described(records: Sequence[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def _row(check: Check) -> str:
-    value = figure(check.value)
-    if check.low is not None and check.high is not None:
-        value += f" [{figure(check.low)}, {figure(check.high)}]"
-    bold = "**" if not check.is_met else ""
-    return f"| {check.name} | {check.goal_is} {check.goal:g} | {bold}{value}{bold} |"
+def _rows(records: Sequence[dict[str, Any]]) -> dict[tuple[str, str], str]:
+    """Return figures by name and goal, those that miss it bold, each with how many it is of."""
+    found: dict[tuple[str, str], str] = {}
+    for check in checks_of(records):
+        if check.goal is None:
+            continue
+        name, _, count = check.name.partition(" (n = ")
+        value = figure(check.value)
+        if check.low is not None and check.high is not None:
+            value += f" [{figure(check.low)}, {figure(check.high)}]"
+        value = value if check.is_met else f"**{value}**"
+        of = f", n = {count.removesuffix(')')}" if count else ""
+        found[name, f"{check.goal_is} {check.goal:g}"] = value + of
+    return found
 
 
 def outcomes(records: Sequence[dict[str, Any]]) -> list[Outcome]:

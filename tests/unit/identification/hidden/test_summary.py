@@ -37,9 +37,24 @@ def test_each_data_set_counts_once_and_what_is_always_named_comes_first():
 def test_goals_that_are_not_reached_are_bold():
     lines = described(RECORDS).splitlines()
     (right,) = [line for line in lines if line.startswith("| effect and place")]
-    assert right == "| effect and place (n = 8) | at least 0.85 | **0.25 [0.0715, 0.591]** |"
+    found = "**0.25 [0.0715, 0.591]**, n = 8"
+    assert right == f"| effect and place | at least 0.85 | {found} | {found} |"
     assert "| drag | 1 of 1 |  |" in lines
     assert "| spring | 2 of 7 | (tie) 2, bias 1, (none) 1, (base_too_coarse) 1 |" in lines
+
+
+def test_what_the_newest_code_says_stands_beside_what_all_did():
+    old = [{**each, "commit": "old"} for each in RECORDS]
+    last = [{**record(named=[("spring", "elbow")]), "commit": "new"}]
+    lines = described([*old, *last]).splitlines()
+    assert lines[0] == "| Figure | Goal | All 10 | The last 1 |"
+    (right,) = [line for line in lines if line.startswith("| effect and place")]
+    now = "1 [0.207, 1], n = 1"
+    assert (
+        right == f"| effect and place | at least 0.85 | **0.333 [0.121, 0.646]**, n = 9 | {now} |"
+    )
+    (outside,) = [line for line in lines if line.startswith("| outside: unexplained")]
+    assert outside.endswith("n = 1 |  |")
 
 
 def test_rates_have_their_intervals():
