@@ -56,6 +56,8 @@ class Fit:
     cost: float
     """Half the sum of squares."""
     starts_agree: bool = True
+    is_rough: bool = False
+    """Whether the derivative may be off by a few percent, see :meth:`Space.jacobian`."""
 
     @property
     def variant(self) -> Variant:
@@ -85,17 +87,18 @@ class Fit:
 
     @staticmethod
     def at(space: Space, z: Float64, segments: tuple[int, ...], is_rough: bool = False) -> "Fit":
-        """Return a vector as it is, with the derivative there, see :meth:`Space.jacobian`."""
-        return Fit.of(space, z, *space.jacobian(z, segments, is_rough=is_rough))
+        """Return a vector as it is, with the derivative there; a rough one only if there is one."""
+        is_rough = is_rough and space.has_rough
+        found = Fit.of(space, z, *space.jacobian(z, segments, is_rough=is_rough))
+        return replace(found, is_rough=is_rough)
 
 
 def polish(
     space: Space,
-    start: Float64,
+    start: Float64 | Fit,
     segments: tuple[int, ...],
     steps: int = _MAX_STEPS,
     enough: float = _ENOUGH,
-    known: tuple[Float64, Float64] | None = None,
     wanted: float = np.inf,
 ) -> Fit:
     """Return a local fit by Levenberg-Marquardt steps within bounds.
@@ -105,23 +108,23 @@ def polish(
 
     Args:
         space: what is fitted.
-        start: float64[n].
+        start: float64[n], or a fit whose derivative is known.
         segments: recordings to fit to.
         steps: the most derivatives after the first.
         enough: what takes off less than this share of the cost with a new derivative is the end.
-        known: residual and derivative at the start, if they are known.
         wanted: a fit whose derivative promises little more, and nothing below this cost, gives up.
     """
-    z = space.clip(start)
-    is_rough = steps > 0 and space.has_rough
-    fit = Fit.at(space, z, segments, is_rough) if known is None else Fit.of(space, z, *known)
+    if isinstance(start, Fit):
+        fit = start
+    else:
+        fit = Fit.at(space, space.clip(start), segments, is_rough=steps > 0)
     for left in reversed(range(steps)):
-        if not is_rough and promised(fit) > max(wanted, fit.cost * (1 - _MUCH)):
+        if not fit.is_rough and promised(fit) > max(wanted, fit.cost * (1 - _MUCH)):
             break
         found = go_down(fit, segments, slight=_MANY * enough)
-        if not is_rough and not found.cost < fit.cost * (1 - enough):
+        if not fit.is_rough and not found.cost < fit.cost * (1 - enough):
             break
-        is_rough = is_rough and left > 0 and found.cost < fit.cost * (1 - _MUCH)
+        is_rough = fit.is_rough and left > 0 and found.cost < fit.cost * (1 - _MUCH)
         z = found.z if found.cost < fit.cost else fit.z
         fit = Fit.at(space, z, segments, is_rough)
     return fit
@@ -161,7 +164,7 @@ def go_down(
             continue
         is_enough = costs[best] > cost * (1 - slight)
         z, residual, cost = tries[best], found[best], float(costs[best])
-        damping = max(dampings[best], 1e-4)
+        damping = max(dampings[best], _HARDLY)
         if is_enough and promised(Fit(space, z, residual, jacobian, cost)) > cost * (1 - slight):
             break
     return Fit(space, z, residual, jacobian, cost)
@@ -342,14 +345,14 @@ def _fitted(space: Space, searched: Float64) -> BaseFits:
     segments = problem.of("train")
     parts, origin = _on_parts(space), np.zeros(space.size)
     pieces = parts.problem.of("train")
-    at_nominal = parts.jacobian(origin, pieces, is_rough=True)
-    begun = polish(parts, origin, pieces, 6, known=at_nominal)
+    at_nominal = Fit.at(parts, origin, pieces, is_rough=True)
+    begun = polish(parts, at_nominal, pieces, 6)
     is_same = parts.problem is problem
     first = begun if is_same else polish(space, begun.z, segments, 6)
     fits = [first, _from_elsewhere(space, searched, first, segments)]
     best = min(fits, key=lambda fit: fit.cost)
     agree = max(fit.cost for fit in fits) <= _as_good(best.cost)
-    nominal = Start(origin, at_nominal[1])
+    nominal = Start(origin, at_nominal.jacobian)
     return BaseFits(nominal, best if is_same else begun, replace(best, starts_agree=agree))
 
 

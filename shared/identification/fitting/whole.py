@@ -10,7 +10,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shared.identification.dataset.types import Float64
 from shared.identification.fitting.fit import Fit, polish
 from shared.identification.gate.held_out import plain_stretches
 from shared.identification.search.searched import ByAll, Search, is_open
@@ -43,7 +42,7 @@ def fit_to_all(found: Search, left: Sequence[Unexplained]) -> None:
     if not more or not (found.accepted or is_asked):
         return
     segments = (*problem.of("train"), *more)
-    fit = polish(current.space, current.z, segments, _STEPS, known=_known(current, more))
+    fit = polish(current.space, _with_more(current, more), segments, _STEPS)
     if found.accepted:
         found.final, found.fitted_to = fit, segments
     if is_asked:
@@ -51,11 +50,13 @@ def fit_to_all(found: Search, left: Sequence[Unexplained]) -> None:
         found.by_all = ByAll(max(one.new for one in both), max(one.plain for one in both))
 
 
-def _known(fit: Fit, more: tuple[int, ...]) -> tuple[Float64, Float64]:
-    """Return residual and derivative of a fit on more segments after those that it has."""
+def _with_more(fit: Fit, more: tuple[int, ...]) -> Fit:
+    """Return a fit as it is on more segments after those that it has."""
     residual, jacobian = fit.space.jacobian(fit.z, more)
     rows = len(fit.residual) - fit.space.size
-    return (
+    return Fit.of(
+        fit.space,
+        fit.z,
         np.concatenate([fit.residual[:rows], residual]),
         np.concatenate([fit.jacobian[:rows], jacobian]),
     )

@@ -174,3 +174,14 @@ def test_the_less_is_enough_the_further_a_fit_follows_a_valley_that_bends():
     found = polish(space, begun, (), 12, enough=1e-6)
     assert found.z == pytest.approx(np.full(2, np.log(2.0)), abs=0.05)
     assert space.derivatives < 12  # each for several steps
+
+
+def test_a_derivative_that_is_known_and_promises_nothing_is_believed():
+    space: Any = Bent()
+    found = polish(space, np.array([0.7, 0.68]), (), 12, enough=1e-6)
+    space.derivatives = 0
+    assert polish(space, found, (), 4) is found
+    assert space.derivatives == 0
+    rough = replace(found, is_rough=True)
+    assert not polish(space, rough, (), 4).is_rough
+    assert space.derivatives > 0

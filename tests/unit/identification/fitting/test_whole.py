@@ -10,7 +10,7 @@ from shared.identification.conclusion.conclude import conclude
 from shared.identification.fitting.fit import Fit, polish
 from shared.identification.fitting.space import Space
 from shared.identification.fitting.whole import (
-    _known,  # pyright: ignore[reportPrivateUsage]
+    _with_more,  # pyright: ignore[reportPrivateUsage]
     fit_to_all,
 )
 from shared.identification.search.searched import Search
@@ -70,11 +70,11 @@ def test_what_is_known_of_the_fit_is_not_simulated_again(searches: Searches):
     """The derivative at the begin is asked of the held-out recordings alone, and is the same."""
     found = _found(searches)
     fresh = Fit.at(found.current.space, found.current.z, found.problem.of("train"))
-    known = _known(fresh, found.problem.of("test"))
+    known = _with_more(fresh, found.problem.of("test"))
     everything = (*found.problem.of("train"), *found.problem.of("test"))
     whole = Fit.at(fresh.space, fresh.z, everything)
-    np.testing.assert_array_equal(known[0], whole.residual)
-    np.testing.assert_array_equal(known[1], whole.jacobian)
+    np.testing.assert_array_equal(known.residual, whole.residual)
+    np.testing.assert_array_equal(known.jacobian, whole.jacobian)
 
 
 def test_the_interval_of_a_cause_that_only_all_recordings_show_is_theirs(searches: Searches):
