@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from services.jobs.identify.residuals import rms_by_joint, shown, stages_of, tracker_off
-from services.jobs.identify.words import THOUSANDTHS, cause_text, unexplained_text
+from services.jobs.identify.words import cause_text, unexplained_text
 from shared.identification.arm.subject import plant_of
 from shared.identification.conclusion.evidence import Evidence, Replay
 from shared.identification.dataset.types import Dataset, Float64
@@ -19,6 +19,7 @@ from shared.telemetry.identification_recording import (
     Span,
     write_overlay_recording,
 )
+from shared.telemetry.wording import THOUSANDTHS
 
 PAUSE = 1.0
 """Between two trajectories (s)."""

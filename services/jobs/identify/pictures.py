@@ -17,13 +17,14 @@ from services.jobs.identify.residuals import (
     window_of,
     worst_joint,
 )
-from services.jobs.identify.words import THOUSANDTHS, floor_name, floor_text, unexplained_mark
+from services.jobs.identify.words import floor_name, floor_text, unexplained_mark
 from shared.identification.conclusion.evidence import Diagnostics, Evidence
 from shared.identification.dataset.types import Float64
 from shared.identification.verdict import BaseValue, Scored, Verdict
 from shared.telemetry import identification_diagnostics as diagnostic
 from shared.telemetry import identification_figures as figures
 from shared.telemetry.identification_diagnostics import Line, Row
+from shared.telemetry.wording import THOUSANDTHS
 
 MOST_JOINTS = 4
 """In a diagnostic."""

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from shared.identification.conclusion.sentence import as_told
 from shared.identification.verdict import Cause, HeldOut, Interval, Tie, Unexplained, Verdict
+from shared.telemetry.wording import scaled
 
 WIDTH = 88
 LISTED = 3
@@ -17,8 +18,6 @@ TITLES = {
     "unexplained": "Something is left that has no name",
 }
 """Of each verdict."""
-THOUSANDTHS = {"s": "ms", "m": "mm", "rad": "mrad"}
-"""Units whose thousandths have a name of their own."""
 MINUS = "\N{MINUS SIGN}"
 
 
@@ -44,18 +43,10 @@ def number_text(value: float, digits: int = 3) -> str:
     return text.replace("-", MINUS)
 
 
-def _scaled(unit: str, *values: float) -> tuple[str, float]:
-    """Return a unit that fits the largest of values, and what to multiply them by."""
-    largest = max((abs(value) for value in values), default=0.0)
-    if unit in THOUSANDTHS and 0.0 < largest < 0.1:
-        return THOUSANDTHS[unit], 1e3
-    return ("" if unit == "1" else unit), 1.0
-
-
 def quantity_text(value: float, unit: str, interval: Interval | None = None) -> str:
     """Return a quantity and its 95 % interval: ``30 ms (29.8 to 30.2)``."""
     ends = () if interval is None else (interval.low, interval.high)
-    shown, factor = _scaled(unit, value, *ends)
+    shown, factor = scaled(unit, value, *ends)
     text = f"{number_text(factor * value)} {shown}".strip()
     if interval is None:
         return text

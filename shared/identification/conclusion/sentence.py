@@ -6,7 +6,10 @@ import msgspec
 
 from shared.identification.search.searched import NEARLY_NOISE
 from shared.identification.verdict import Cause, HeldOut, Interval, Tie, Unexplained, Word
-from shared.telemetry.wording import listing
+from shared.telemetry.wording import listing, scaled
+
+_WAY = frozenset("xyz")
+"""Numbers that are a way in space."""
 
 
 def sentence_of(
@@ -99,14 +102,17 @@ def as_told(cause: Cause) -> Cause:
     """Return a cause with a size for people: of what is sought as one over it, the thing itself.
 
     ``inverse_limit`` in 1/(N m) is a limit in N m; its upper end is infinite where the inverse may
-    be 0, which is no limit. Of a cosine and a sine it is the amplitude, as well known as either.
-    Where the first of several numbers may be 0, it is the one that is most surely not.
+    be 0, which is no limit. Of a cosine and a sine it is the amplitude, as well known as either; of
+    a way that is nothing but a way, its length, as if its parts were known apart. Where the first
+    of several numbers may be 0, it is the one that is most surely not.
     """
     if cause.quantity == "cosine":
         amplitude = math.hypot(cause.value, cause.others["sine"])
         half = 0.5 * (cause.interval.high - cause.interval.low)
         ends = Interval(low=max(amplitude - half, 0.0), high=amplitude + half)
         return msgspec.structs.replace(cause, quantity="amplitude", value=amplitude, interval=ends)
+    if _WAY <= {cause.quantity, *cause.others} <= _WAY | {"time"}:
+        return _as_length(cause)
     name = cause.quantity.removeprefix("inverse_")
     if name == cause.quantity or not cause.value > 0.0:
         return _by_surest(cause)
@@ -118,6 +124,25 @@ def as_told(cause: Cause) -> Cause:
         unit=cause.unit.removeprefix("1/").strip("()"),
         interval=Interval(low=1.0 / high, high=1.0 / low if low > 0.0 else float("inf")),
     )
+
+
+def _as_length(cause: Cause) -> Cause:
+    values = {cause.quantity: cause.value, **cause.others}
+    intervals = {cause.quantity: cause.interval, **cause.other_intervals}
+    way = {axis: values[axis] for axis in sorted(_WAY)}
+    length = math.hypot(*way.values())
+    along = (
+        value / max(length, 1e-12) * 0.5 * (intervals[axis].high - intervals[axis].low)
+        for axis, value in way.items()
+        if axis in intervals
+    )
+    half = math.hypot(*along)
+    return msgspec.structs.replace(
+        cause, quantity="distance", value=length, others={**way, **cause.others},
+        interval=Interval(low=max(length - half, 0.0), high=length + half),
+        other_units={**dict.fromkeys(way, cause.unit), **cause.other_units},
+        other_intervals={axis: each for axis, each in intervals.items() if axis in values},
+    )  # fmt: skip
 
 
 def _by_surest(cause: Cause) -> Cause:
@@ -146,9 +171,22 @@ def _may_be_nothing(interval: Interval) -> bool:
 
 
 def _size(cause: Cause) -> str:
+    """Return how large a cause is, and when it was there if it was not always."""
     told = as_told(cause)
-    unit = "" if told.unit == "1" else f" {told.unit}"
-    if told.interval.high == float("inf"):
-        return f"{told.quantity} {told.value:.3g}{unit}, at least {told.interval.low:.3g}"
     half = (told.interval.high - told.interval.low) / 2
-    return f"{told.quantity} {told.value:.3g} ± {half:.1g}{unit}"
+    unit, factor = scaled(told.unit, told.value, *((half,) if math.isfinite(half) else ()))
+    unit = f" {unit}" if unit else ""
+    value = f"{told.quantity} {factor * told.value:.3g}"
+    if not math.isfinite(half):
+        return f"{value}{unit}, at least {factor * told.interval.low:.3g}{_when(told)}"
+    rounded = float(f"{factor * half:.1g}")
+    return f"{value} ± {rounded:g}{unit}{_when(told)}"
+
+
+def _when(cause: Cause) -> str:
+    """Return when something was there that happened once; after a comma, or nothing."""
+    begin, length = cause.others.get("begin"), cause.others.get("length")
+    if begin is not None and length is not None:
+        return f", from {begin:.2f} to {begin + length:.2f} s"
+    since = cause.others.get("time")
+    return "" if since is None else f", from {since:.2f} s on"

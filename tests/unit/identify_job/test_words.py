@@ -70,6 +70,33 @@ def test_a_ripple_is_told_by_its_amplitude() -> None:
     assert cause_text(ripple) == "it ripples at elbow: amplitude 0.2 N m (0.19 to 0.21)"
 
 
+def test_a_slip_is_told_by_its_length_and_since_when() -> None:
+    slip = Cause(
+        effect="tracker_slip", where="sweep", quantity="x", value=0.0003, unit="m",
+        interval=Interval(low=-0.0001, high=0.0007), others={"y": 0.0, "z": -0.0004, "time": 3.5},
+        other_units={"y": "m", "z": "m", "time": "s"}, title="it slipped", signature="",
+        other_intervals={
+            "y": Interval(low=-0.0004, high=0.0004), "z": Interval(low=-0.0008, high=0.0)
+        },
+    )  # fmt: skip
+    assert cause_text(slip) == "it slipped at sweep: distance 0.5 mm (0.1 to 0.9)"
+    told = as_told(slip)
+    assert (told.others["x"], told.other_units["x"]) == (0.0003, "m")
+    assert told.other_intervals["x"] == slip.interval
+    sentence = sentence_of("named", (slip,), (), example("named").verdict.held_out, ())
+    assert "it slipped at sweep (distance 0.5 ± 0.4 mm, from 3.50 s on)." in sentence
+
+
+def test_a_push_is_told_with_its_time() -> None:
+    push = Cause(
+        effect="external_contact", where="elbow in sweep", quantity="torque", value=-200.0,
+        unit="N m", interval=Interval(low=-220.0, high=-180.0), title="it pushed", signature="",
+        others={"begin": 1.25, "length": 0.5}, other_units={"begin": "s", "length": "s"},
+    )  # fmt: skip
+    sentence = sentence_of("named", (push,), (), example("named").verdict.held_out, ())
+    assert "(torque -200 ± 20 N m, from 1.25 to 1.75 s)." in sentence
+
+
 def test_a_cause_is_told_by_the_number_that_is_most_surely_not_nothing() -> None:
     tilt = Cause(
         effect="gravity_tilt", where="", quantity="x", value=0.004, unit="rad",
