@@ -245,9 +245,10 @@ class Rollouts:
                 if name in row.fields:
                     values[row.index] = row.fields[name].reshape(values[row.index].shape)
         self._stale = wanted
-        if wanted & _CONSTANTS or self._needs_constants:
-            self._batch.set_const(np.arange(len(rows)))
-        self._needs_constants = bool(wanted & _CONSTANTS)
+        needs = bool(wanted & _CONSTANTS)
+        if needs or self._needs_constants:
+            self._batch.set_const(np.arange(len(rows) if needs else self.capacity))
+        self._needs_constants = needs
 
     def _settle(self, rows: Sequence[Row]) -> None:
         """Put added joints where their loads leave them; twice, as that changes the loads."""
