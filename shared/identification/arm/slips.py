@@ -32,6 +32,8 @@ _BLOCK = 0.1
 """For standard errors: what noise is like within it is all the same (s)."""
 _RANK = 1e-6
 """Of the largest singular value: what is less changes nothing."""
+_TINY = 1e-18
+"""Less than any length or noise: what a planar arm never does, is divided by it."""
 
 
 def slips_of(rollouts: Rollouts, recordings: Sequence[Trajectory]) -> dict[str, tuple[float, ...]]:
@@ -119,12 +121,13 @@ def _lasting_steps(off: Float64, bends: Float64, at: Float64) -> Float64:
         bends: float64[K, N], what the rest of it may be a sum of.
         at: float64[K], of one recording after the other (s).
     """
-    basis, sizes, _ = np.linalg.svd(bends / np.linalg.norm(bends, axis=0), full_matrices=False)
+    lengths = np.linalg.norm(bends, axis=0)
+    basis, sizes, _ = np.linalg.svd(bends / np.maximum(lengths, _TINY), full_matrices=False)
     basis = basis[:, sizes > _RANK * sizes[0]]
     left = off - basis @ (basis.T @ off)
     count = max(round(_BLOCK / float(np.median(np.diff(at)))), 1)
     blocks = left[: len(left) // count * count].reshape(-1, count, off.shape[1]).mean(axis=1)
-    variance = count * np.mean(blocks**2, axis=0)
+    variance = np.maximum(count * np.mean(blocks**2, axis=0), _TINY)
     later, shown = (np.cumsum(each[::-1], axis=0)[::-1] for each in (left, basis))
     own = np.arange(len(off), 0, -1) - np.sum(shown**2, axis=1)
     is_told = own > _FEWEST

@@ -101,6 +101,20 @@ def test_where_it_stays_put_no_slip_is_looked_for(subject: Subject):
     assert slips_of(subject.nominal, recordings) == {}
 
 
+def test_a_hand_that_never_moves_one_way_is_looked_at_all_the_same(subject: Subject):
+    """A planar arm's hand has no velocity across, and without noise it is nowhere off there."""
+    still = np.zeros((600, 3))
+    seen = _seen(subject, 100.0, 0.0)
+    assert seen.tracker_at is not None
+    at_rest = tool_poses(subject.plant, subject.nominal.model, still)
+    there = replace(seen, q=still, command=still, tracker=at_rest)
+    assert slips_of(subject.nominal, [there]) == {}
+    moved = at_rest.copy()
+    moved[300:, :3] += rotated(at_rest[300:, 3:], np.array(WAY))
+    times = slips_of(subject.nominal, [replace(there, tracker=moved)])["slow"]
+    assert min(abs(at - 3.0) for at in times) < 0.02
+
+
 def test_the_tracker_is_off_from_the_slip_on(subject: Subject):
     motion = recorded(_waving, seconds=2.0)
     plain = _tracker(replay(subject, motion))
