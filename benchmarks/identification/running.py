@@ -6,6 +6,7 @@ import os
 import sys
 import tempfile
 import time
+import traceback
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import replace
@@ -141,8 +142,10 @@ def one(job: tuple[Trial, bool, float | None]) -> dict[str, Any] | None:
                 (hidden,) = truth.effect
                 begun = _begun(dataset, trial.recipe.seed, steps)
                 record["explainable"] = explainable(begun, hidden)
-        except RiposteError as error:
-            return {"key": trial.key, "cell": trial.cell, "error": str(error), "commit": commit()}
+        except Exception as error:  # a defect counts as one, and the others go on
+            traceback.print_exc()
+            said = str(error) if isinstance(error, RiposteError) else repr(error)
+            return {"key": trial.key, "cell": trial.cell, "error": said, "commit": commit()}
         record["commit"] = commit()
         if with_baselines:
             begun = _begun(dataset, trial.recipe.seed, steps)

@@ -2,10 +2,12 @@ import json
 
 import pytest
 
+from benchmarks.identification import running
 from benchmarks.identification.judging import judged
 from benchmarks.identification.protocol import FIRST_SEED, protocol
 from benchmarks.identification.running import by_turns, finished, run
 from benchmarks.identification.table import checks_of, confusion, curve, taken_off, wilson
+from shared.errors import RiposteError
 from shared.sim.hidden.effect import hidden_effects
 
 
@@ -52,6 +54,21 @@ def test_the_error_of_a_vector_is_that_of_all_numbers_in_its_unit():
     hidden = effect("frame", x=[3.0, "m"], y=[4.0, "m"], turn=[9.0, "rad"])
     named = cause("frame", quantity="x", value=3.0, others={"y": 3.0, "turn": 1.0})
     assert judged(record(hidden=[hidden], named=[named])).errors == pytest.approx((0.2,))
+
+
+@pytest.mark.parametrize(
+    ("error", "said"), [(ValueError("no end"), "ValueError('no end')"), (RiposteError("a"), "a")]
+)
+def test_a_data_set_that_ends_in_an_error_does_not_end_the_run(error, said, monkeypatch, capsys):
+    def fail(*_, **__):
+        raise error
+
+    monkeypatch.setattr(running, "hide", fail)
+    trial = protocol(0.05)[0]
+    found = running.one((trial, False, None))
+    assert found is not None
+    assert (found["key"], found["error"]) == (trial.key, said)
+    assert "Traceback" in capsys.readouterr().err
 
 
 def test_an_interval_covers_or_does_not():
