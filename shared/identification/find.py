@@ -13,7 +13,7 @@ from shared.identification.conclusion.conclude import Conclusion, conclude, exte
 from shared.identification.conclusion.evidence import Evidence
 from shared.identification.conclusion.gathered import evidence_of
 from shared.identification.dataset.caveats import in_words
-from shared.identification.dataset.types import Dataset, stepped
+from shared.identification.dataset.types import Dataset, with_timestep
 from shared.identification.effect import Effect
 from shared.identification.fitting.problem import BLOCK, Variant
 from shared.identification.fitting.saved import load, save
@@ -84,7 +84,7 @@ def identify(
     if _may_be_its_step(found) and (step := shorter(found.base)) is not None:
         progress("base fit", 0.0, f"again, at a time step of {1e3 * step:g} ms")
         again = None if resume_folder is None else resume_folder / "shorter_step"
-        other = begun(stepped(dataset, step), again)
+        other = begun(with_timestep(dataset, step), again)
         other, other_left = _searched(other, seed, progress, clock)
         if not is_open(other):
             found, left = other, other_left

@@ -117,6 +117,6 @@ class Dataset:
         return all(each.tracker is not None for each in self.trajectories)
 
 
-def stepped(dataset: Dataset, timestep: float) -> Dataset:
+def with_timestep(dataset: Dataset, timestep: float) -> Dataset:
     """Return the recordings with another time step of the model's physics (s)."""
     return replace(dataset, source=replace(dataset.source, timestep=timestep))
