@@ -92,23 +92,26 @@ def _in_hand(
 
 def _lasting(rollouts: Rollouts, recordings: Sequence[Trajectory]) -> list[tuple[str, float]]:
     """Return recordings and instants after which a tracker sits elsewhere, the likeliest first."""
-    seen = [
-        (each.name, each.tracker_at, *_in_hand(rollouts, each, each.tracker_at, each.tracker))
-        for each in recordings
-        if each.tracker_at is not None and each.tracker is not None
-        if len(each.tracker_at) >= 2 * _FEWEST
-    ]
-    if not seen:
+    names: list[str] = []
+    times: list[Float64] = []
+    seen: list[tuple[Float64, Float64]] = []
+    for each in recordings:
+        if each.tracker_at is None or each.tracker is None or len(each.tracker_at) < 2 * _FEWEST:
+            continue
+        names.append(each.name)
+        times.append(each.tracker_at)
+        seen.append(_in_hand(rollouts, each, each.tracker_at, each.tracker))
+    if not names:
         return []
-    off, bends = (np.concatenate([each[part] for each in seen]) for part in (2, 3))
-    at = np.concatenate([each[1] for each in seen])
-    which = np.repeat(np.arange(len(seen)), [len(each[1]) for each in seen])
+    off, bends = (np.concatenate(each) for each in zip(*seen, strict=True))
+    at = np.concatenate(times)
+    which = np.repeat(np.arange(len(names)), [len(each) for each in times])
     is_first = np.r_[True, np.diff(which) > 0]
     size = np.where(is_first, 0.0, _lasting_steps(off, bends, at))
     found: list[tuple[str, float]] = []
     while len(found) < _MOST and size.max() >= _LASTS:
         edge = int(np.argmax(size))
-        found.append((seen[which[edge]][0], 0.5 * float(at[edge - 1] + at[edge])))
+        found.append((names[int(which[edge])], 0.5 * float(at[edge - 1] + at[edge])))
         size[(which == which[edge]) & (np.abs(at - at[edge]) < _APART)] = 0.0
     return found
 
