@@ -26,7 +26,8 @@ def wilson(hits: int, count: int) -> tuple[float, float]:
     rate, spread = hits / count, _Z**2 / count
     middle = (rate + spread / 2) / (1 + spread)
     half = _Z * math.sqrt(rate * (1 - rate) / count + spread / (4 * count)) / (1 + spread)
-    return max(0.0, middle - half), min(1.0, middle + half)
+    low, high = middle - half, middle + half
+    return (low if hits else 0.0), (high if hits < count else 1.0)  # rounding leaves 3e-17 of 0
 
 
 def checks_of(records: Sequence[dict[str, Any]]) -> tuple[Check, ...]:
