@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.identification.arm.motion import motion_of
+from shared.identification.arm.projection import basis_of, without
 from shared.identification.dataset.types import Float64, Trajectory
-from shared.sim.plant.inverse import inverse_dynamics, missing_torques
+from shared.sim.plant.inverse import given_torques, inverse_dynamics
 from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.signals import Signal, filtered
 
@@ -35,8 +36,6 @@ _RANK = 1e-8
 """Of the largest singular value: what is less is nothing."""
 _INSTANTS = 4000
 """Looked at, of all recordings together."""
-
-
 _APART = 1.0
 """Ripples in the whole travel that two frequencies are apart by (1)."""
 
@@ -51,10 +50,10 @@ class _Motion:
     """float64[N, J] (rad/s, m/s)."""
     qdd: Float64
     """float64[N, J] (rad/s^2, m/s^2)."""
-    taken: Float64
-    """float64[N, J], torque by the model (N m, N)."""
+    given: Float64
+    """float64[N, J], what the drives would have given (N m, N)."""
     missing: Float64
-    """float64[N, J], what of it the drives would not have given (N m, N)."""
+    """float64[N, J], what the motion takes beyond that (N m, N)."""
     is_first: NDArray[np.bool_]
     """bool[N], whether a recording begins there."""
 
@@ -80,9 +79,9 @@ def _moved(nominal: Rollouts, recordings: Sequence[Trajectory]) -> _Motion:
         command = filtered(command, plant.command.filter, recording.duration)
         q, qd, qdd = motion.q[::every], motion.qd[::every], motion.qdd[::every]
         held = command.held(motion.at[::every])
-        taken = inverse_dynamics(plant, model, q, qd, qdd)
-        missing = missing_torques(plant, model, q, qd, qdd, held)
-        parts.append((q, qd, qdd, taken, missing, np.arange(len(q)) == 0))
+        given = given_torques(plant, model, q, qd, held)
+        missing = inverse_dynamics(plant, model, q, qd, qdd) - given
+        parts.append((q, qd, qdd, given, missing, np.arange(len(q)) == 0))
     return _Motion(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
 
@@ -97,10 +96,10 @@ def _strongest(motion: _Motion, joint: int) -> tuple[float, ...]:
     own = np.stack([np.ones_like(q), *ways], axis=1)
     found = _seen(own, torque, off, np.asarray, ())
     if len(found) > 1:  # none of them is clear
-        given = motion.taken[:, [joint]] - motion.missing[:, [joint]]
+        given = motion.given[:, [joint]]
         postures = np.sin(motion.q), np.cos(motion.q)
         others = np.concatenate([own, given, motion.qd, motion.qdd, *postures], axis=1)
-        left = _without(_basis(others), torque[:, None])[:, 0]
+        left = without(basis_of(others, _RANK), torque[:, None])[:, 0]
         found += _seen(others, torque, off, _whitening(left, motion.is_first), found)
     return tuple(count / travel for count in found)
 
@@ -118,11 +117,11 @@ def _seen(
         white: what both and ripples are seen through.
         known: ripples that are.
     """
-    basis = _basis(white(rest))
-    left = _without(basis, white(torque[:, None]))[:, 0]
+    basis = basis_of(white(rest), _RANK)
+    left = without(basis, white(torque[:, None]))[:, 0]
     phases = (2.0 * np.pi * count * off for count in _COUNTS)
     waves = (np.stack([np.cos(phase), np.sin(phase)], axis=1) for phase in phases)
-    powers = np.array([_power(left, _without(basis, white(each))) for each in waves])
+    powers = np.array([_power(left, without(basis, white(each))) for each in waves])
     found: list[float] = []
     for index in np.argsort(-powers):
         if powers[index] < _BESIDE * powers.max() or len(found) == KEPT:
@@ -147,18 +146,6 @@ def _whitening(left: Float64, is_first: NDArray[np.bool_]) -> Callable[[Float64]
         return (signal[1:] - share * signal[:-1])[~is_first[1:]]
 
     return white
-
-
-def _basis(rest: Float64) -> Float64:
-    """Return float64[N, R] of length 1 and at right angles, for the columns of float64[N, K]."""
-    lengths = np.maximum(np.linalg.norm(rest, axis=0), 1e-18)
-    basis, sizes, _ = np.linalg.svd(rest / lengths, full_matrices=False)
-    return np.asarray(basis[:, sizes > _RANK * sizes[0]], np.float64)
-
-
-def _without(basis: Float64, signal: Float64) -> Float64:
-    """Return float64[N, K] without what a basis makes of it."""
-    return signal - basis @ (basis.T @ signal)
 
 
 def _power(left: Float64, waves: Float64) -> float:

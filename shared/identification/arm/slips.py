@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shared.identification.arm.projection import basis_of, without
 from shared.identification.dataset.types import Float64, Trajectory
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.poses import conjugate, rotated
@@ -33,7 +34,7 @@ _BLOCK = 0.1
 _RANK = 1e-6
 """Of the largest singular value: what is less changes nothing."""
 _TINY = 1e-18
-"""Less than any length or noise: what a planar arm never does, is divided by it."""
+"""Less than any noise (m^2): a planar arm without any is nowhere off across."""
 
 
 def slips_of(rollouts: Rollouts, recordings: Sequence[Trajectory]) -> dict[str, tuple[float, ...]]:
@@ -43,25 +44,60 @@ def slips_of(rollouts: Rollouts, recordings: Sequence[Trajectory]) -> dict[str, 
         rollouts: of the arm as the model has it.
         recordings: of it, in the order of recording; only those to fit to are looked at.
     """
-    seen = [each for each in recordings if each.split == "train"]
-    found = {each.name: [slip_of(rollouts, each)] for each in seen}
-    for name, at in _lasting(rollouts, seen):
-        found[name].append(at)
-    known = {name: sorted({at for at in times if at is not None}) for name, times in found.items()}
-    return {name: tuple(times) for name, times in known.items() if times}
+    seen = [
+        one
+        for each in recordings
+        if each.split == "train" and (one := _seen(rollouts, each)) is not None
+    ]
+    found = [(one.name, at) for one in seen if (at := _clearest(one)) is not None]
+    known: dict[str, set[float]] = {}
+    for name, at in (*found, *_lasting(seen)):
+        known.setdefault(name, set()).add(at)
+    return {one.name: tuple(sorted(known[one.name])) for one in seen if one.name in known}
 
 
 def slip_of(rollouts: Rollouts, recording: Trajectory) -> float | None:
-    """Return the likeliest instant, on the tracker's clock (s); None if no step stands out.
+    """Return the instant of the clearest step, on the tracker's clock (s); None if none stands out.
 
     Args:
         rollouts: of the arm as the model has it.
         recording: of it.
     """
-    if recording.tracker_at is None or recording.tracker is None:
+    seen = _seen(rollouts, recording)
+    return None if seen is None else _clearest(seen)
+
+
+class _Seen(NamedTuple):
+    """Where a tracker is beside where it should be."""
+
+    name: str
+    """Of the recording."""
+    at: Float64
+    """float64[K] (s)."""
+    off: Float64
+    """float64[K, 3], in the hand's frame (m)."""
+    bends: Float64
+    """float64[K, 2 J + 4] of the posture and the hand's velocity, in which what wrong encoders,
+    links and clocks do is about linear."""
+
+
+def _seen(rollouts: Rollouts, recording: Trajectory) -> _Seen | None:
+    """Return a recording's tracker; None if it has too few readings to tell a step."""
+    at, tracker = recording.tracker_at, recording.tracker
+    if at is None or tracker is None or len(at) < 2 * _FEWEST:
         return None
-    at = recording.tracker_at
-    off, _ = _in_hand(rollouts, recording, at, recording.tracker)
+    q = sampled(recording.joints_at, recording.q, at)
+    expected = tool_poses(rollouts.plant, rollouts.model, q)
+    to_hand = conjugate(expected[:, 3:])
+    off = rotated(to_hand, tracker[:, :3] - expected[:, :3])
+    velocity = rotated(to_hand, np.gradient(expected[:, :3], at, axis=0))
+    bends = np.column_stack([np.ones(len(at)), np.sin(q), np.cos(q), velocity])
+    return _Seen(recording.name, at, off, bends)
+
+
+def _clearest(seen: _Seen) -> float | None:
+    """Return when the clearest step is (s); None if none stands out."""
+    at, off = seen.at, seen.off
     period = float(np.median(np.diff(at)))
     looks = [
         _looked(off, max(_FEWEST, round(length / period)), clear) for length, clear in _WINDOWS
@@ -73,45 +109,18 @@ def slip_of(rollouts: Rollouts, recording: Trajectory) -> float | None:
     return 0.5 * float(at[edge - 1] + at[edge])
 
 
-def _in_hand(
-    rollouts: Rollouts, recording: Trajectory, at: Float64, tracker: Float64
-) -> tuple[Float64, Float64]:
-    """Return where a tracker is beside where it should be in the hand's frame, and what bends that.
-
-    Returns:
-        float64[K, 3] (m), and float64[K, 2 J + 4] of the posture and the hand's velocity, in which
-        wrong encoders, links and clocks are about linear.
-    """
-    q = sampled(recording.joints_at, recording.q, at)
-    expected = tool_poses(rollouts.plant, rollouts.model, q)
-    to_hand = conjugate(expected[:, 3:])
-    off = rotated(to_hand, tracker[:, :3] - expected[:, :3])
-    velocity = rotated(to_hand, np.gradient(expected[:, :3], at, axis=0))
-    return off, np.column_stack([np.ones(len(at)), np.sin(q), np.cos(q), velocity])
-
-
-def _lasting(rollouts: Rollouts, recordings: Sequence[Trajectory]) -> list[tuple[str, float]]:
+def _lasting(seen: Sequence[_Seen]) -> list[tuple[str, float]]:
     """Return recordings and instants after which a tracker sits elsewhere, the likeliest first."""
-    names: list[str] = []
-    times: list[Float64] = []
-    seen: list[tuple[Float64, Float64]] = []
-    for each in recordings:
-        if each.tracker_at is None or each.tracker is None or len(each.tracker_at) < 2 * _FEWEST:
-            continue
-        names.append(each.name)
-        times.append(each.tracker_at)
-        seen.append(_in_hand(rollouts, each, each.tracker_at, each.tracker))
-    if not names:
+    if not seen:
         return []
-    off, bends = (np.concatenate(each) for each in zip(*seen, strict=True))
-    at = np.concatenate(times)
-    which = np.repeat(np.arange(len(names)), [len(each) for each in times])
+    at, off, bends = (np.concatenate(each) for each in zip(*(one[1:] for one in seen), strict=True))
+    which = np.repeat(np.arange(len(seen)), [len(one.at) for one in seen])
     is_first = np.r_[True, np.diff(which) > 0]
     size = np.where(is_first, 0.0, _lasting_steps(off, bends, at))
     found: list[tuple[str, float]] = []
     while len(found) < _MOST and size.max() >= _LASTS:
         edge = int(np.argmax(size))
-        found.append((names[int(which[edge])], 0.5 * float(at[edge - 1] + at[edge])))
+        found.append((seen[int(which[edge])].name, 0.5 * float(at[edge - 1] + at[edge])))
         size[(which == which[edge]) & (np.abs(at - at[edge]) < _APART)] = 0.0
     return found
 
@@ -124,10 +133,8 @@ def _lasting_steps(off: Float64, bends: Float64, at: Float64) -> Float64:
         bends: float64[K, N], what the rest of it may be a sum of.
         at: float64[K], of one recording after the other (s).
     """
-    lengths = np.linalg.norm(bends, axis=0)
-    basis, sizes, _ = np.linalg.svd(bends / np.maximum(lengths, _TINY), full_matrices=False)
-    basis = basis[:, sizes > _RANK * sizes[0]]
-    left = off - basis @ (basis.T @ off)
+    basis = basis_of(bends, _RANK)
+    left = without(basis, off)
     count = max(round(_BLOCK / float(np.median(np.diff(at)))), 1)
     blocks = left[: len(left) // count * count].reshape(-1, count, off.shape[1]).mean(axis=1)
     variance = np.maximum(count * np.mean(blocks**2, axis=0), _TINY)

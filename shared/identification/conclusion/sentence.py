@@ -141,7 +141,7 @@ def _as_length(cause: Cause) -> Cause:
         cause, quantity="distance", value=length, others={**way, **cause.others},
         interval=Interval(low=max(length - half, 0.0), high=length + half),
         other_units={**dict.fromkeys(way, cause.unit), **cause.other_units},
-        other_intervals={axis: each for axis, each in intervals.items() if axis in values},
+        other_intervals=intervals,
     )  # fmt: skip
 
 

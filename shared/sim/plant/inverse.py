@@ -133,6 +133,22 @@ def missing_torques(
         qdd: float64[T, J] (rad/s^2, m/s^2).
         command: float64[T, U], in force at each instant.
     """
+    given = given_torques(plant, model, q, qd, command)
+    return inverse_dynamics(plant, model, q, qd, qdd) - given
+
+
+def given_torques(
+    plant: Plant, model: mujoco.MjModel, q: Float64, qd: Float64, command: Float64
+) -> Float64:
+    """Return float64[T, J]: what the drives would give in a motion (N m, N).
+
+    Args:
+        plant: the arm; its actuators have no state of their own.
+        model: of it, compiled.
+        q: float64[T, J] (rad, m).
+        qd: float64[T, J] (rad/s, m/s).
+        command: float64[T, U], in force at each instant.
+    """
     data = mujoco.MjData(model)
     joints = [model.joint(name) for name in plant.joints]
     places = np.array([int(joint.qposadr[0]) for joint in joints])
@@ -150,4 +166,4 @@ def missing_torques(
         mujoco.mj_fwdVelocity(model, data)
         mujoco.mj_fwdActuation(model, data)
         given[index] = data.qfrc_actuator[dofs]
-    return inverse_dynamics(plant, model, q, qd, qdd) - given
+    return given
