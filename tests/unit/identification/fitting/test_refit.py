@@ -75,7 +75,7 @@ def test_a_cause_that_bends_the_base_gets_a_derivative_of_its_own(tmp_path: Path
     space = fit.space.grown(Candidate(BIAS, "elbow"))
     start = np.r_[fit.z, 0.0]
     found = settle(space, start, train, known=fit)
-    assert found.cost < 0.1 * fit.cost
+    assert found.cost < 0.06 * fit.cost
 
 
 def test_a_full_fit_comes_down_however_far_the_base_was_bent(tmp_path: Path):
