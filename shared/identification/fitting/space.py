@@ -141,7 +141,7 @@ class Space:
         residual, change = self.problem.moved(
             self.variant(z), [self.variant(each) for each in moved], segments, is_rough
         )
-        towards = (np.stack(moved) - z) / self.priors
+        towards = (np.reshape(moved, (len(moved), self.size)) - z) / self.priors
         found = np.concatenate([change, towards], axis=1)
         return np.r_[residual, z / self.priors], found.T / steps[list(columns)]
 

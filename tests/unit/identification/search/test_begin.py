@@ -44,5 +44,16 @@ def test_a_search_begins_again_without_what_its_base_may_not_bend(searches: Sear
     assert [each.name for each in found.problem.parameters] == names
 
 
+def test_a_search_may_begin_with_a_base_that_bends_in_nothing(searches: Searches):
+    found = searches.search(_BAD)
+    train, origin = found.problem.of("train"), np.zeros(found.base.space.size)
+    found.nominal = Start(origin, found.base.space.jacobian(origin, train)[1])
+    again = begin_without(found, range(found.base.space.size), seed=3)
+    assert again.problem.parameters == ()
+    assert again.base.z.shape == again.parts.z.shape == (0,)
+    assert again.base.jacobian.shape == (len(again.base.residual), 0)
+    assert again.base.cost == pytest.approx(found.base.cost)  # which bends in nothing either
+
+
 def test_nothing_is_doubted_of_a_base_as_the_file_has_it(searches: Searches):
     assert doubted_of(searches.base) == []
