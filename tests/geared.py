@@ -39,7 +39,11 @@ _OFF = 0.08
 
 
 def problem_of_geared(
-    folder: Path, load: float = 0.0, is_bare: bool = False, is_sensed: bool = False
+    folder: Path,
+    load: float = 0.0,
+    is_bare: bool = False,
+    is_sensed: bool = False,
+    push: float = 0.0,
 ) -> Problem:
     """Return recordings of 4 s, read to 0.02 mrad, none repeated.
 
@@ -48,6 +52,7 @@ def problem_of_geared(
         load: at the tool, that the file does not have (kg).
         is_bare: whether the file has neither armature nor damping, either.
         is_sensed: whether torques are those of sensors beyond the gears, not of motors.
+        push: what pushes the first joint all the time (N m).
     """
     path = write_arm(folder, "torque")
     text = re.sub(r'frictionloss="[^"]*"', "", path.read_text())
@@ -56,7 +61,7 @@ def problem_of_geared(
     path.write_text(text)
     plant = mjcf(path, "torque", JOINTS, JOINTS, "tool")
     recordings = tuple(
-        _recording(plant, load, name, rates, is_sensed) for name, rates in _RATES.items()
+        _recording(plant, load, name, rates, is_sensed, push) for name, rates in _RATES.items()
     )
     dataset = Dataset(
         folder, ModelSource("mjcf", path), "torque", JOINTS, JOINTS, recordings, (), ""
@@ -74,7 +79,7 @@ def candidates(problem: Problem, *names: str) -> tuple[Candidate, ...]:
 
 
 def _recording(
-    plant: Plant, load: float, name: str, rates: tuple[float, ...], is_sensed: bool
+    plant: Plant, load: float, name: str, rates: tuple[float, ...], is_sensed: bool, push: float
 ) -> Trajectory:
     """Return a motion and the torques that it takes of the arm as it is."""
     at: Float64 = np.arange(0.0, 4.0, 0.005)
@@ -93,6 +98,7 @@ def _recording(
     model.body_mass[tool] *= grown
     model.body_inertia[tool] *= grown
     torque = inverse_dynamics(plant, model, q, qd, qdd)
+    torque[:, 0] -= push
     if is_sensed:
         wave = np.sin(at[:, None] * np.array([5.3, 6.1, 7.7]) + rates[0])
         torque = torque + _OFF * torque.std(axis=0) * wave

@@ -4,7 +4,8 @@ Most model files of real arms have links and no friction. Where that is as large
 a base without it has its links bent to where nothing else can be seen any more. So it is fitted
 at all joints at once before anything is looked for, from where the torques lead. What is surely
 needed there is named like any other cause. So is a load at the tool, where links would have to be
-bent further than is believable without it: with as much missing nothing would be seen beside it.
+bent further than is believable without it, and a constant torque at a joint that does not show what
+most others have: with as much missing nothing would be seen beside it.
 """
 
 from collections.abc import Sequence
@@ -28,6 +29,7 @@ from shared.identification.search.screen import Screened
 _OF_DRIVES = ("coulomb_friction", "rotor_inertia", "viscous_friction")
 """Effects that sit only where the model file has nothing of the kind."""
 _CARRIED = "payload"
+_PUSHES = "torque_bias"
 _MUCH_BETTER = 15.0
 """By so much less, as part of the cost, a load of more numbers is taken for one of fewer."""
 _AT_MOST = 2.0
@@ -95,11 +97,17 @@ def loads_of(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     return tuple(each for each in candidates if each.effect.name == _CARRIED)
 
 
+def offsets_of(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Return the constant torques that joints may have."""
+    return tuple(each for each in candidates if each.effect.name == _PUSHES)
+
+
 def with_drives(
     base: Fit,
     lacks: tuple[Candidate, ...],
     rng: np.random.Generator,
     loads: tuple[Candidate, ...] = (),
+    offsets: tuple[Candidate, ...] = (),
 ) -> Family | None:
     """Return what the drives have that the file lacks; None if nothing surely is there.
 
@@ -108,6 +116,7 @@ def with_drives(
         lacks: what there may be, effect by effect.
         rng: draws.
         loads: of which there may be one, too, fewest numbers first.
+        offsets: of which there may be one at each joint that does not show what most others have.
     """
     if not lacks:
         return None
@@ -120,8 +129,14 @@ def with_drives(
         if other.cost < together.cost - _MUCH_BETTER:
             together = other
     kept = _needed(together, test, rng)
+    odd = {each.place for each in set(lacks) - set(kept)}
+    pushed = tuple(each for each in offsets if each.place in odd)
+    if kept and pushed:
+        other = _fitted(Space(problem, (*together.space.candidates, *pushed)), train)
+        if other.cost < together.cost - _MUCH_BETTER:
+            together, kept = other, _needed(other, test, rng)
     if not set(kept) & set(lacks):
-        return None  # what the tool carries is found like any other cause
+        return None  # what the tool carries, or pushes, is found like any other cause
     is_whole = len(kept) == len(together.space.candidates)
     fit = together if is_whole else _fitted(Space(problem, kept), train)
     after = stretches(problem, fit.variant, test)
@@ -148,7 +163,7 @@ def _fitted(space: Space, train: tuple[int, ...]) -> Fit:
 
 
 def _needed(fit: Fit, test: tuple[int, ...], rng: np.random.Generator) -> tuple[Candidate, ...]:
-    """Return those without which a fit is surely worse.
+    """Return those without which a fit is surely worse, and that are surely more than nothing.
 
     Of a joint's, what most joints need; at the others it is there, too, if what was fitted to says
     so: an arm of which one joint does not rub makes up for that by a rotor that nothing moves.
@@ -158,9 +173,12 @@ def _needed(fit: Fit, test: tuple[int, ...], rng: np.random.Generator) -> tuple[
     out: list[Candidate] = []
     for name, group in groupby(fit.space.candidates, lambda each: each.effect.name):
         own = list(group)
-        sure = [each for each in own if compare(left_without(fit, each, test), after, rng).is_sure]
-        if name == _CARRIED:
+        there = [each for each in own if is_there(fit, each, train)]
+        sure = [
+            each for each in there if compare(left_without(fit, each, test), after, rng).is_sure
+        ]
+        if name in (_CARRIED, _PUSHES):
             out += sure
         elif len(sure) >= max(_FEWEST, _MOST * len(own)):
-            out += [each for each in own if each in sure or is_there(fit, each, train)]
+            out += there
     return tuple(out)

@@ -29,6 +29,7 @@ from shared.identification.search.bare import (
     lacking,
     loads_of,
     no_more,
+    offsets_of,
     screened_of,
     with_drives,
 )
@@ -209,7 +210,8 @@ def _drives(
     """Return what the model file lacks of the drives; beside a load where links are held."""
     lacks = lacking(done.whole.space, candidates)
     loads = loads_of(candidates) if is_held else ()
-    return with_drives(done.whole, lacks, np.random.default_rng([seed, 3]), loads)
+    rng = np.random.default_rng([seed, 3])
+    return with_drives(done.whole, lacks, rng, loads, offsets_of(candidates))
 
 
 def _held(done: BaseFits, gone: Sequence[int]) -> BaseFits:

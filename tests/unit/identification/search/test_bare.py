@@ -16,6 +16,7 @@ from shared.identification.search.bare import (
     lacking,
     loads_of,
     no_more,
+    offsets_of,
     screened_of,
     with_drives,
 )
@@ -57,6 +58,25 @@ def test_a_load_is_found_with_them_where_there_is_one(tmp_path: Path, load: floa
     carried = [each for each in found.gains if each.effect.name == "payload"]
     sizes = [space.values(found.fit.z)[space.candidates.index(each)][0] for each in carried]
     assert sizes == ([pytest.approx(load, rel=0.05)] if load else [])
+
+
+def test_a_joint_that_something_pushes_shows_what_others_have_beside_that(tmp_path: Path):
+    problem = problem_of_geared(tmp_path, is_bare=True, push=5.0)
+    problem = replace(problem, noise=replace(problem.noise, joints=np.full(len(JOINTS), 1e-3)))
+    known = candidates(problem, *DRIVES, "torque_bias")
+    base = _base(problem)
+    lacks = lacking(base.space, known)
+    assert not {each.effect.name for each in lacks} - set(DRIVES)
+    alone = with_drives(base, lacks, np.random.default_rng(0))
+    found = with_drives(base, lacks, np.random.default_rng(0), offsets=offsets_of(known))
+    assert found is not None
+    (pushed,) = (each for each in found.gains if each.effect.name == "torque_bias")
+    assert pushed.place == JOINTS[0]
+    space = found.fit.space
+    (size,) = space.values(found.fit.z)[space.candidates.index(pushed)]
+    assert size == pytest.approx(5.0, rel=0.05)
+    assert alone is None or alone.losses.mean() > 100.0 * found.losses.mean()
+    assert set(lacks) < set(found.gains)
 
 
 def test_a_load_of_an_arm_that_does_not_rub_is_left_to_the_search(
