@@ -19,7 +19,7 @@ from shared.identification.dataset.caveats import difference
 from shared.identification.dataset.resolution import steps_of
 from shared.identification.dataset.types import Dataset, Float64, Trajectory
 from shared.identification.noise.drift import Drift, drift_of
-from shared.identification.noise.memory import Memory, memory_of
+from shared.identification.noise.memory import Memory, memory_of, wandering
 from shared.identification.noise.pushed import Pushed, pushed_of, whitening
 from shared.identification.noise.quiet import level_of
 from shared.sim.plant.rollouts import Rollouts
@@ -35,6 +35,8 @@ _OF_PAIR = np.sqrt(0.5)
 """Of what two recordings differ by, that is the noise of one."""
 _SAME = 1e-3
 """Share of their movement by which commands differ that are the same but for rounding."""
+_AXES = (slice(0, 3), slice(3, 6))
+"""Of a tracker's error: how far off it is along each, and about each."""
 _ROUND = np.sqrt(12.0)
 """A step, in standard deviations of what rounding to it does."""
 
@@ -217,7 +219,8 @@ def _remembered(
             return replace(grown, memory=None) if _answers(dataset) else grown
     found = memory_of(joints, _OF_PAIR, rounding)
     if noise.tracker is not None:
-        found = found.beside(memory_of(tracker, _OF_PAIR, no_steps))
+        seen = memory_of(tracker, _OF_PAIR, no_steps)
+        found = found.beside(wandering(seen, tracker, _OF_PAIR, _AXES))
     return replace(noise, memory=found)
 
 

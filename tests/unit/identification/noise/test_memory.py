@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shared.identification.dataset.types import Float64
-from shared.identification.noise.memory import Memory, memory_of
+from shared.identification.noise.memory import Memory, memory_of, wandering
 
 
 def carried_on(rng: np.random.Generator, kept: float, blocks: int, channels: int = 3) -> Float64:
@@ -59,3 +59,60 @@ def test_channels_follow_those_of_another():
     found = joints.beside(tracker)
     assert found.kept.tolist() == [0.5, 0.0, 0.0]
     assert found.fresh.tolist() == [0.8, 1.0, 1.0]
+
+
+_AXES = (slice(0, 3), slice(3, 6))
+
+
+def drifting(rng: np.random.Generator, drift: float, blocks: int = 600) -> Float64:
+    """Return float64[blocks, 6]: noise of 0.04 s, the first three of which drift in 8 s as well."""
+    out = carried_on(rng, 0.6, blocks, 6)
+    out[:, :3] += drift * carried_on(rng, float(np.exp(-0.02 / 8.0)), blocks)
+    return out
+
+
+def _found(drift: float) -> tuple[Memory, Memory]:
+    """Return what two pairs of repeats say, without a level and with one."""
+    rng = np.random.default_rng(5)
+    apart = [drifting(rng, drift) - drifting(rng, drift) for _ in range(2)]
+    plain = memory_of(apart, np.sqrt(0.5), np.zeros(6))
+    return plain, wandering(plain, apart, np.sqrt(0.5), _AXES)
+
+
+def _offsets(memory: Memory, drift: float) -> tuple[Float64, Float64]:
+    """Return float64[6]: what a recording's offset is off by, as is thought and in truth."""
+    way = memory.news(np.ones((600, 6)))[1:]
+    size = np.sum(way**2, axis=0)
+    rng = np.random.default_rng(6)
+    of_each = [memory.news(drifting(rng, drift))[1:] for _ in range(100)]
+    off = np.array([np.sum(way * news, axis=0) / size for news in of_each])
+    return 1.0 / np.sqrt(size), np.sqrt(np.mean(off**2, axis=0))
+
+
+def test_how_far_a_recordings_offset_is_off_is_known_where_a_tracker_drifts():
+    plain, memory = _found(0.33)
+    thought, off = _offsets(memory, 0.33)
+    assert (off[:3] < 1.6 * thought[:3]).all()
+    assert (off[:3] > 0.8 * thought[:3]).all()
+    thought, off = _offsets(plain, 0.33)
+    assert (off[:3] > 3.0 * thought[:3]).all()
+
+
+def test_what_drifts_says_nothing_of_channels_of_another_kind():
+    plain, memory = _found(0.33)
+    assert (memory.wanders[:3] > 0.0).all()
+    thought, off = _offsets(memory, 0.33)
+    assert off[3:] == pytest.approx(thought[3:], rel=0.4)
+    assert thought[3:].max() < 0.6 * thought[:3].min()
+    assert memory.kept == pytest.approx(plain.kept)
+
+
+def test_news_of_what_drifts_are_of_variance_one():
+    _, memory = _found(0.33)
+    news = memory.news(drifting(np.random.default_rng(7), 0.33, 4000))
+    assert np.mean(news[1:] ** 2, axis=0) == pytest.approx(1.0, rel=0.15)
+
+
+def test_of_series_too_short_to_say_no_level_wanders():
+    memory = memory_of([np.ones((1, 6))], 1.0, np.zeros(6))
+    assert wandering(memory, [np.ones((1, 6))], 1.0, _AXES) == memory
