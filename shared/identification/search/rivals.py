@@ -1,5 +1,7 @@
 """Which of several causes that pass is taken, and which are not told from it."""
 
+import math
+
 import numpy as np
 
 from shared.identification.dataset.types import Float64
@@ -17,9 +19,11 @@ _EVENT = 4.0
 what happened once would be most of the mean, and most of its error."""
 _NEARLY = 0.05
 """Of the cost on what was fitted to: by so much two causes that hardly differ may be apart."""
-_FITTED_BETTER, _FITTED_FAR_BETTER = 5.0, 12.5
-"""Of the cost: what one more number takes off by chance once in six hundred times, and a number
-that is five standard errors off nothing."""
+_FITTED_BETTER, _FITTED_FAR_BETTER, _EACH_MORE = 5.0, 12.5, 4.0
+"""Of the cost: what one more number takes off by chance once in six hundred times, a number
+that is five standard errors off nothing, and each number beside that one."""
+_SURELY = 4.5
+"""Standard errors by which one load does better than another, fitted to and held out together."""
 _APART = 0.5
 """Cosine of what two causes explain, up to which three quarters of it are not the same."""
 _BENT = 15.0
@@ -43,9 +47,9 @@ def simplest(useful: list[Tried], rng: np.random.Generator) -> tuple[Tried, tupl
     which something large happened has no more of a say than ``_EVENT`` usual ones. Where hardly
     more than noise is left, it is what the base could not make up for of what was held out; where
     much is, that would be most of what tells one large cause from another. Of what does as well as
-    the best one, and has links bent no further for it, the simplest is taken, unless a load is
-    surely another one by what was fitted to; what needs more numbers to do no better is no rival,
-    unless it is in the nature of both that they are hardly told apart.
+    the best one, and has links bent no further for it, the simplest is taken, unless it is surely
+    another one by what was fitted to; what needs more numbers to do no better is no rival, unless
+    it is in the nature of both that they are hardly told apart.
     """
     is_apart = all(one.gain.apart is not None and one.gain.before < NEARLY_NOISE for one in useful)
     most = _EVENT * min(float(np.median(one.everywhere(is_apart))) for one in useful)
@@ -91,17 +95,25 @@ def _is_nearly(taken: Tried, other: Tried, is_apart: bool, rng: np.random.Genera
 
 
 def _outdoes(better: Tried, other: Tried, is_apart: bool, rng: np.random.Generator) -> bool:
-    """Return whether of two loads what was fitted to surely prefers one, and what is held out, too.
+    """Return whether what was fitted to surely prefers one, and what is held out, too.
 
-    Or that does not say otherwise: a load that depends on posture differs from a constant one by
-    little of what either takes off, and by less the less the arm goes about.
+    Or that does not say otherwise. A load that depends on posture differs from a constant one by
+    little of what either takes off, and by less the less the arm goes about: of two loads all
+    recordings together have to be sure. Of others what was fitted to has to be, the more so the
+    more numbers it takes: they make up for what a base lacks.
     """
-    if not {better.candidate.effect.name, other.candidate.effect.name} <= _LOADS:
+    names = {better.candidate.effect.name, other.candidate.effect.name}
+    apart = other.fit.cost - better.fit.cost
+    if apart <= 0.0 or frozenset(names) in _STANDS_OFF:
         return False
-    if other.fit.cost - better.fit.cost < _FITTED_FAR_BETTER:
-        return False
-    margin = compare(better.held(is_apart), other.held(is_apart), rng)
-    return margin.gain < margin.error
+    margin = compare(other.held(is_apart), better.held(is_apart), rng)
+    held = margin.gain / max(margin.error, 1e-12)
+    if names <= _LOADS:
+        is_sure = math.sqrt(2.0 * apart) + held >= _SURELY
+    else:
+        more = max(better.numbers - other.numbers - 1, 0)
+        is_sure = apart >= _FITTED_FAR_BETTER + _EACH_MORE * more
+    return is_sure and held > -1.0
 
 
 def _is_alike(

@@ -78,11 +78,32 @@ def test_rough_refits_that_say_little_leave_fewer_candidates_out(
     assert _worth_a_fit(roughly, cost) == roughly[:kept]
 
 
+def _fitted_as_well(one: Tried, other: Tried, less: float = 0.0) -> Tried:
+    """Return one as if what was fitted to preferred it by so much of the cost."""
+    return replace(one, fit=replace(one.fit, cost=other.fit.cost - less))
+
+
 def test_of_causes_that_do_as_well_the_one_of_fewer_numbers_is_taken(searches: Searches):
-    best = searches.tried(DRAG, _BAD, _GOOD, numbers=3)
     simple = searches.tried(ELBOW, _BAD, _GOOD + 0.01)
+    best = _fitted_as_well(searches.tried(DRAG, _BAD, _GOOD, numbers=3), simple)
     taken, rivals = simplest([best, simple], np.random.default_rng(0))
     assert taken is simple
+    assert rivals == ()
+
+
+@pytest.mark.parametrize(
+    ("less", "worse", "is_taken"),
+    [(18.0, 0.0, True), (15.0, 0.0, False), (18.0, 0.035, False)],
+)
+def test_one_of_more_numbers_is_taken_if_what_was_fitted_to_is_sure_of_it(
+    searches: Searches, less: float, worse: float, is_taken: bool
+):
+    simple = searches.tried(ELBOW, _BAD, _GOOD)
+    about = worse + np.tile([-0.06, 0.06], 4)  # held out it does 1.6 standard errors worse
+    more = searches.tried(DRAG, _BAD, _GOOD + about, numbers=3)
+    more = _fitted_as_well(more, simple, less)
+    taken, rivals = simplest([more, simple], np.random.default_rng(0))
+    assert taken is (more if is_taken else simple)
     assert rivals == ()
 
 
@@ -90,8 +111,8 @@ def test_of_causes_that_do_as_well_the_one_of_fewer_numbers_is_taken(searches: S
 def test_what_does_as_well_by_bending_links_further_is_not_taken_however_simple(
     searches: Searches, bend: float, is_taken: bool
 ):
-    best = searches.tried(DRAG, _BAD, _GOOD, numbers=3)
     simple = searches.tried(ELBOW, _BAD, _GOOD)
+    best = _fitted_as_well(searches.tried(DRAG, _BAD, _GOOD, numbers=3), simple)
     names = [each.name for each in searches.problem.parameters]
     z = simple.fit.z.copy()
     z[names.index("mass elbow")] = bend  # 2 or 6 standard deviations: 2 or 18 of the cost
@@ -120,8 +141,8 @@ def test_which_cause_does_best_is_judged_by_all_recordings(searches: Searches):
     """Of more numbers, one does a little better held out; where it was fitted to it does not."""
     rng = np.random.default_rng(0)
     little, fitted = 0.02 + 0.005 * rng.normal(size=8), 1.0 + 0.1 * rng.normal(size=24)
-    much = searches.tried(DRAG, _BAD, _GOOD, numbers=3)
     simple = searches.tried(ELBOW, _BAD, _GOOD + little * 10.0)
+    much = _fitted_as_well(searches.tried(DRAG, _BAD, _GOOD, numbers=3), simple)
     assert simplest([much, simple], rng)[0] is much
     more = fitted + 0.2 + 0.2 * rng.normal(size=24)
     both = replace(much, fitted=more), replace(simple, fitted=fitted)
@@ -292,6 +313,7 @@ def test_turns_so_short_that_they_are_a_delay_are_a_rival_of_it(searches: Search
     about = 0.01 + np.tile([-0.06, 0.06], 4)  # better in one stretch, worse in the next
     turns = searches.tried(Candidate(TURNS, ""), _BAD, _GOOD + about, numbers=2)
     other = searches.tried(DRAG, _BAD, _GOOD + 0.01, numbers=2)
+    turns, other = (_fitted_as_well(each, late) for each in (turns, other))
     taken, rivals = simplest([turns, late, other], np.random.default_rng(0))
     assert taken is late
     assert rivals == (turns,)
@@ -317,6 +339,8 @@ def test_a_counterbalance_and_a_constant_torque_are_rivals_unless_one_does_surel
     ("worse", "less", "named", "is_tie"),
     [
         (0.0, 3.0, "torque_bias", True),
+        (0.0, 11.0, "counterbalance", False),  # 4.7 standard errors
+        (0.015, 11.0, "torque_bias", True),  # 4.7, and 0.7 held out that say otherwise
         (0.0, 14.0, "counterbalance", False),
         (0.035, 14.0, "torque_bias", True),  # held out it does 1.6 standard errors worse
         (0.035, 3.0, "torque_bias", False),
