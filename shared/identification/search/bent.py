@@ -50,6 +50,8 @@ _SPOILED = 1.2
 _SLIGHT = 15.0
 """What a cause must take off the cost, what speaks against the base included: half a sum of squares
 of standard deviations, as one number makes that is 5.5 of them off."""
+_EACH_MORE = 4.0
+"""The same for each number of a cause but the first: a tool's offset has six."""
 
 
 def otherwise(found: Search, progress: Progress) -> Otherwise | None:
@@ -76,7 +78,8 @@ def otherwise(found: Search, progress: Progress) -> Otherwise | None:
         progress("refit", index / len(instead), each.candidate.label)
         space = base.space.grown(each.candidate)
         start = np.r_[each.shift, each.start]
-        fit = polish(space, start, train, _STEPS, _ENOUGH, wanted=base.cost - _SLIGHT)
+        wanted = base.cost - _plainly(space.size - base.space.size)
+        fit = polish(space, start, train, _STEPS, _ENOUGH, wanted=wanted)
         losses = stretches(problem, space.variant(fit.z), test)
         is_sure = is_there(fit, each.candidate, train)
         if is_sure and _brings_back(base, fit) and not is_worse(losses, found.base_losses):
@@ -155,7 +158,13 @@ def _against(base: Fit) -> float:
 
 def _brings_back(base: Fit, fit: Fit) -> bool:
     """Return whether less is far from the model file in a fit, and that says something."""
-    return set(_far(fit)) < set(_far(base)) and base.cost - fit.cost > _SLIGHT
+    is_plain = base.cost - fit.cost > _plainly(fit.space.size - base.space.size)
+    return is_plain and set(_far(fit)) < set(_far(base))
+
+
+def _plainly(numbers: int) -> float:
+    """Return what a cause of so many numbers must take off the cost."""
+    return _SLIGHT + _EACH_MORE * (numbers - 1)
 
 
 def is_worse(losses: Float64, than: Float64) -> bool:

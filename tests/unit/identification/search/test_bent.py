@@ -6,14 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shared.identification.effect import Candidate
 from shared.identification.fitting.fit import Fit, polish
 from shared.identification.fitting.space import Space
 from shared.identification.search.bent import (
+    _brings_back,  # pyright: ignore[reportPrivateUsage]
     _known,  # pyright: ignore[reportPrivateUsage]
     _still_far,  # pyright: ignore[reportPrivateUsage]
     _surely_far,  # pyright: ignore[reportPrivateUsage]
 )
 from shared.sim.plant.row import Row
+from tests.geared import candidates
 from tests.measured import measure, nothing, problem_of
 
 NAME = "armature elbow"
@@ -50,3 +53,27 @@ def test_a_base_of_which_the_recordings_say_that_it_is_far_stays_there(tmp_path:
     names = [each.name for each in space.problem.parameters]
     assert [names[index] for index in _surely_far(found)] == [NAME]
     assert found.z[names.index(NAME)] == pytest.approx(np.log(8.0), rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("less", "alone", "with_more"), [(14.0, False, False), (20.0, True, False), (30.0, True, True)]
+)
+def test_a_cause_of_many_numbers_must_explain_more_than_one_of_one(
+    tmp_path: Path, less: float, alone: bool, with_more: bool
+):
+    base, _ = bases(tmp_path, is_far=True)
+    index = [each.name for each in base.space.problem.parameters].index(NAME)
+
+    def nearer(candidate: Candidate) -> Fit:
+        space = base.space.grown(candidate)
+        z = np.r_[base.z, np.zeros(space.size - base.space.size)]
+        z[index] = 0.0
+        return replace(base, space=space, z=z, cost=base.cost - less)
+
+    (torque,) = (
+        each for each in candidates(base.space.problem, "torque_bias") if each.place == "elbow"
+    )
+    carried = candidates(base.space.problem, "payload")[-1]  # its mass and where
+    assert _brings_back(base, nearer(torque)) is alone
+    assert nearer(carried).space.size == base.space.size + 4
+    assert _brings_back(base, nearer(carried)) is with_more
