@@ -67,11 +67,11 @@ def pushed(tmp_path_factory: pytest.TempPathFactory) -> Fit:
 
 
 def beside(pushed: Fit, candidate: Candidate, size: Float64) -> Fit:
-    """Return the same with a cause of a size, in its units."""
+    """Return the same with a cause of about a size, in its units, one step nearer to its best."""
     space = pushed.space.grown(candidate)
     quantities = candidate.effect.quantities(space.problem.subject, candidate.place)
     start = np.r_[pushed.z, size / np.array([each.probe for each in quantities])]
-    return polish(space, start, space.problem.of("train"), steps=0)
+    return polish(space, start, space.problem.of("train"), steps=1)
 
 
 def is_explained(
