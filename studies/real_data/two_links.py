@@ -23,7 +23,7 @@ from studies.real_data.folders import arm_of_motors, hashes_of, in_parts, there,
 
 JOINTS = ("shoulder", "elbow")
 FILES = ("two_link_observer_05_norm.csv", "two_link_observer_05_fast.csv")
-PARTS = 3
+_PARTS = 3
 _TORQUE = 1.0 / 400.0
 """Of a unit of current (N m)."""
 _BODIES = """
@@ -72,7 +72,7 @@ def _parts(name: str, table: Float64, begin: float, seconds: float) -> list[Traj
     torque = np.column_stack([first + second, second])  # the second one pushes off the stand
     return [
         replace(each, name=f"{name}_{each.name}")
-        for each in in_parts(at, q, torque, (begin, begin + seconds), PARTS)
+        for each in in_parts(at, q, torque, (begin, begin + seconds), _PARTS)
     ]
 
 

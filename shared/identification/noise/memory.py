@@ -47,8 +47,11 @@ class Memory:
         Args:
             residuals: float64[B, C], in noise floors, of one recording or part.
         """
-        fresh = (residuals[1:] - self.kept * residuals[:-1]) / self.fresh
-        return np.concatenate([residuals[:1], _beyond_level(fresh, self.wanders)])
+        fresh = _beyond_last(residuals, self.kept) / self.fresh
+        for gain in np.unique(self.wanders[self.wanders > 0.0]):
+            own = self.wanders == gain
+            fresh[:, own] = _beyond_level(fresh[:, own], float(gain))
+        return np.concatenate([residuals[:1], fresh])
 
     def beside(self, other: "Memory") -> "Memory":
         """Return that of these channels, then of others."""
@@ -60,14 +63,16 @@ class Memory:
         return self.wanders if len(self.wanders) else np.zeros_like(self.kept)
 
 
-def _beyond_level(fresh: Float64, gains: Float64) -> Float64:
+def _beyond_last(residuals: Float64, kept: Float64) -> Float64:
+    """Return float64[B - 1, C] without what each block has of the one before it."""
+    return residuals[1:] - kept * residuals[:-1]
+
+
+def _beyond_level(fresh: Float64, gain: float) -> Float64:
     """Return float64[B, C] without a level from 0 on, which goes along with what is new."""
-    out = fresh
-    for gain in np.unique(gains[gains > 0.0]):
-        own = gains == gain
-        out = out.copy() if out is fresh else out
-        out[:, own] = lfilter([1.0, -1.0], [1.0, gain - 1.0], fresh[:, own], axis=0)
-    return out
+    if gain == 0.0:
+        return fresh
+    return np.asarray(lfilter([1.0, -1.0], [1.0, gain - 1.0], fresh, axis=0), np.float64)
 
 
 def wandering(
@@ -86,14 +91,10 @@ def wandering(
         return memory
     wanders, fresh = np.zeros_like(memory.kept), memory.fresh.copy()
     for own in alike:
+        new = [_beyond_last(each[:, own], memory.kept[own]) for each in long]
         levels: list[tuple[float, float, Float64]] = []
         for gain in _GAINS:
-            gains = np.full_like(memory.kept[own], gain)
-            left = [
-                _beyond_level(each[1:, own] - memory.kept[own] * each[:-1, own], gains)
-                for each in long
-            ]
-            level, _ = level_of(left, scale)
+            level, _ = level_of([_beyond_level(each, gain) for each in new], scale)
             levels.append((float(np.log(level).mean()), gain, level))
         _, wanders[own], fresh[own] = min(levels, key=lambda one: one[0])
     return replace(memory, fresh=fresh, wanders=wanders)
@@ -111,5 +112,5 @@ def memory_of(series: Sequence[Float64], scale: float, rounding: Float64) -> Mem
     if not long:
         return Memory(np.zeros_like(rounding), np.ones_like(rounding))
     kept = np.minimum(level_of(long, scale)[1], _MOST)
-    fresh, _ = level_of([each[1:] - kept * each[:-1] for each in long], scale)
+    fresh, _ = level_of([_beyond_last(each, kept) for each in long], scale)
     return Memory(kept, np.maximum(fresh, rounding * np.sqrt(1.0 + kept**2)))

@@ -4,8 +4,8 @@ Most model files of real arms have links and no friction. Where that is as large
 a base without it has its links bent to where nothing else can be seen any more. So it is fitted
 at all joints at once before anything is looked for, from where the torques lead. What is surely
 needed there is named like any other cause. So is a load at the tool, where links would have to be
-bent further than is believable without it, and a constant torque at a joint that does not show what
-most others have: with as much missing nothing would be seen beside it.
+bent further than is believable without it, and a constant torque at a joint that does not show all
+of what the file lacks: with as much missing nothing would be seen beside it.
 """
 
 from collections.abc import Sequence
@@ -31,7 +31,8 @@ _OF_DRIVES = ("coulomb_friction", "rotor_inertia", "viscous_friction")
 _CARRIED = "payload"
 _PUSHES = "torque_bias"
 _MUCH_BETTER = 15.0
-"""By so much less, as part of the cost, a load of more numbers is taken for one of fewer."""
+"""By so much less, as part of the cost, more numbers are taken for fewer: a load's, or those of
+constant torques."""
 _AT_MOST = 2.0
 """Noise floors, in those of a base with drives where the torques lead, not yet at its best."""
 _FEWEST = 2
@@ -116,7 +117,7 @@ def with_drives(
         lacks: what there may be, effect by effect.
         rng: draws.
         loads: of which there may be one, too, fewest numbers first.
-        offsets: of which there may be one at each joint that does not show what most others have.
+        offsets: of which there may be one at each joint that does not show all of what it lacks.
     """
     if not lacks:
         return None

@@ -24,7 +24,14 @@ from shared.identification.gate.certainty import half_widths, is_there
 from shared.identification.gate.held_out import compare, stretches
 from shared.identification.progress import Progress
 from shared.identification.search.screen import Screened, screen
-from shared.identification.search.searched import ALIKE, NEARLY_NOISE, Otherwise, Search, Tried
+from shared.identification.search.searched import (
+    ALIKE,
+    EACH_MORE,
+    NEARLY_NOISE,
+    Otherwise,
+    Search,
+    Tried,
+)
 from shared.identification.verdict import Cause, Interval, Tie
 from shared.telemetry.wording import listing
 
@@ -50,8 +57,6 @@ _SPOILED = 1.2
 _SLIGHT = 15.0
 """What a cause must take off the cost, what speaks against the base included: half a sum of squares
 of standard deviations, as one number makes that is 5.5 of them off."""
-_EACH_MORE = 4.0
-"""The same for each number of a cause but the first: a tool's offset has six."""
 
 
 def otherwise(found: Search, progress: Progress) -> Otherwise | None:
@@ -164,7 +169,7 @@ def _brings_back(base: Fit, fit: Fit) -> bool:
 
 def _plainly(numbers: int) -> float:
     """Return what a cause of so many numbers must take off the cost."""
-    return _SLIGHT + _EACH_MORE * (numbers - 1)
+    return _SLIGHT + EACH_MORE * (numbers - 1)
 
 
 def is_worse(losses: Float64, than: Float64) -> bool:

@@ -11,19 +11,25 @@ from shared.identification.fitting.parameters import bends
 from shared.identification.fitting.refit import settle
 from shared.identification.fitting.turns import LATE
 from shared.identification.gate.certainty import SURE
+from shared.identification.gate.foretold import SURELY
 from shared.identification.gate.held_out import compare, stretches
-from shared.identification.search.searched import ALIKE, NEARLY_NOISE, Search, Tried, cosine
+from shared.identification.search.searched import (
+    ALIKE,
+    EACH_MORE,
+    NEARLY_NOISE,
+    Search,
+    Tried,
+    cosine,
+)
 
 _EVENT = 4.0
 """Times the mean square residual of the usual stretch that one counts with at most, between causes:
 what happened once would be most of the mean, and most of its error."""
 _NEARLY = 0.05
 """Of the cost on what was fitted to: by so much two causes that hardly differ may be apart."""
-_FITTED_BETTER, _FITTED_FAR_BETTER, _EACH_MORE = 5.0, 12.5, 4.0
-"""Of the cost: what one more number takes off by chance once in six hundred times, a number
-that is five standard errors off nothing, and each number beside that one."""
-_SURELY = 4.5
-"""Standard errors by which one load does better than another, fitted to and held out together."""
+_FITTED_BETTER, _FITTED_FAR_BETTER = 5.0, 12.5
+"""Of the cost: what one more number takes off by chance once in six hundred times, and a number
+that is five standard errors off nothing."""
 _APART = 0.5
 """Cosine of what two causes explain, up to which three quarters of it are not the same."""
 _BENT = 15.0
@@ -109,10 +115,10 @@ def _outdoes(better: Tried, other: Tried, is_apart: bool, rng: np.random.Generat
     margin = compare(other.held(is_apart), better.held(is_apart), rng)
     held = margin.gain / max(margin.error, 1e-12)
     if names <= _LOADS:
-        is_sure = math.sqrt(2.0 * apart) + held >= _SURELY
+        is_sure = math.sqrt(2.0 * apart) + held >= SURELY
     else:
         more = max(better.numbers - other.numbers - 1, 0)
-        is_sure = apart >= _FITTED_FAR_BETTER + _EACH_MORE * more
+        is_sure = apart >= _FITTED_FAR_BETTER + EACH_MORE * more
     return is_sure and held > -1.0
 
 

@@ -16,6 +16,8 @@ from shared.identification.search.screen import Screened, Seen
 
 ALIKE = 0.02
 """Of a cause's gain: what does as well within this is not told from it."""
+EACH_MORE = 4.0
+"""Of the cost: what each number of a cause but the first has to take off, too."""
 NEARLY_NOISE = 1.4
 """Mean square residual below which nothing worth a name is left."""
 BESIDE_A_NAME = 1.7
