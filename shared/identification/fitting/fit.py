@@ -30,6 +30,8 @@ _MUCH = 0.01
 that promises less than it is believed."""
 _MENDED = 6
 """The most steps with one derivative."""
+STRAIGHT = 0.15
+"""Of a change, that a derivative may be off by to do for good."""
 _NEARLY = 0.01
 """A second start that comes down to so little more than the first one has found the same."""
 _SLIGHT = 0.01
@@ -104,7 +106,8 @@ def polish(
     """Return a local fit by Levenberg-Marquardt steps within bounds.
 
     A derivative costs as much as many looks, so it is used for several steps, see :func:`go_down`.
-    A rough one does where a step takes much off; the last one never is.
+    A rough one does where a step takes much off; the last one never is. Where one foretells a step
+    that takes little off, it does after that step.
 
     Args:
         space: what is fitted.
@@ -124,7 +127,11 @@ def polish(
         found = go_down(fit, segments, slight=_MANY * enough)
         if not fit.is_rough and not found.cost < fit.cost * (1 - enough):
             break
-        is_rough = fit.is_rough and left > 0 and found.cost < fit.cost * (1 - _MUCH)
+        is_far = found.cost < fit.cost * (1 - _MUCH)
+        if not (fit.is_rough or is_far) and is_foretold(fit, found):
+            fit = found
+            continue
+        is_rough = fit.is_rough and left > 0 and is_far
         z = found.z if found.cost < fit.cost else fit.z
         fit = Fit.at(space, z, segments, is_rough)
     return fit
@@ -168,6 +175,13 @@ def go_down(
         if is_enough and promised(Fit(space, z, residual, jacobian, cost)) > cost * (1 - slight):
             break
     return Fit(space, z, residual, jacobian, cost)
+
+
+def is_foretold(before: Fit, after: Fit) -> bool:
+    """Return whether a fit's derivative foretold what a step changed: it does there, too."""
+    came = after.residual - before.residual
+    off = came - before.jacobian @ (after.z - before.z)
+    return float(off @ off) < STRAIGHT**2 * float(came @ came)
 
 
 def promised(fit: Fit) -> float:
@@ -367,11 +381,11 @@ def _from_elsewhere(space: Space, start: Float64, first: Fit, segments: tuple[in
     for _ in range(6):
         if first.cost * (1 - _ENOUGH) < found.cost < first.cost * (1 + _NEARLY):
             return first
-        fit = Fit.at(space, found.z, segments)
+        fit = Fit.at(space, found.z, segments, is_rough=True)
         found = go_down(fit, segments)
         if not found.cost < fit.cost * (1 - _ENOUGH):
             break
-    return fit
+    return polish(space, fit, segments, 6) if fit.is_rough and fit.cost < first.cost else fit
 
 
 def _as_good(cost: float) -> float:

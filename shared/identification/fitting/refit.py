@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.identification.dataset.types import Float64
-from shared.identification.fitting.fit import Fit, Start, damped, go_down, promised
+from shared.identification.fitting.fit import STRAIGHT, Fit, Start, damped, go_down, promised
 from shared.identification.fitting.space import Space
 from shared.identification.fitting.turns import LIKELY, NEAR, aligned, turning_of
 from shared.identification.search.screen import Screened
@@ -25,8 +25,6 @@ _MENDING = (1e-4, 1e-2, 1.0)
 _PARTS = (1.0, 0.5, 0.25)
 """Of the way to where the screen expects the best fit, for a start."""
 _ENOUGH = 0.01
-_STRAIGHT = 0.15
-"""Of a change, that a derivative may be off by to do for good."""
 _EVERY = 2
 """One in so many parts is enough for a rough look."""
 
@@ -159,10 +157,10 @@ def _descend(
 def settle(
     space: Space, start: Float64, segments: tuple[int, ...], known: Fit | None = None
 ) -> Fit:
-    """Return a fit from one true derivative, mended as it goes: enough to judge, not to report.
+    """Return a fit from one rough derivative, mended as it goes: enough to judge, not to report.
 
-    Twice, where the second derivative still finds something; from none, where one that is known
-    foretells what comes.
+    An exact one follows, where the rough one found much and promises more; from none, where one
+    that is known foretells what comes.
 
     Args:
         space: what is fitted.
@@ -175,7 +173,7 @@ def settle(
         if _is_straight(known, down):
             return down
         start = down.z
-    before = _in_turn(Fit.at(space, space.clip(start), segments), segments)
+    before = _in_turn(Fit.at(space, space.clip(start), segments, is_rough=True), segments)
     found = go_down(before, segments, _DAMPINGS)
     if found.cost > before.cost * (1 - _ENOUGH) or _is_there(found):
         return found
@@ -197,7 +195,7 @@ def _is_straight(known: Fit, down: Fit) -> bool:
     rows = len(known.residual) - known.space.size
     came = down.residual[:rows] - known.residual[:rows]
     off = came - down.jacobian[:rows] @ moved
-    return float(off @ off) < _STRAIGHT**2 * float(came @ came)
+    return float(off @ off) < STRAIGHT**2 * float(came @ came)
 
 
 def _is_there(fit: Fit) -> bool:
@@ -212,4 +210,4 @@ def _in_turn(fit: Fit, segments: tuple[int, ...]) -> Fit:
         return fit
     others = fit.jacobian[:, : min(turning.interval, turning.phase)]
     z = aligned(fit.space, fit.z, segments, NEAR, others)
-    return fit if z is fit.z else Fit.at(fit.space, z, segments)
+    return fit if z is fit.z else Fit.at(fit.space, z, segments, is_rough=True)

@@ -10,13 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shared.identification.fitting.fit import Fit, polish
+from shared.identification.fitting.fit import Fit, go_down, is_foretold
 from shared.identification.gate.held_out import plain_stretches
 from shared.identification.search.searched import ByAll, Search, is_open
 from shared.identification.verdict import Unexplained
-
-_STEPS = 1
-"""Derivatives after the first: it begins where three in five of the recordings lead."""
 
 
 def fit_to_all(found: Search, left: Sequence[Unexplained]) -> None:
@@ -42,7 +39,10 @@ def fit_to_all(found: Search, left: Sequence[Unexplained]) -> None:
     if not more or not (found.accepted or is_asked):
         return
     segments = (*problem.of("train"), *more)
-    fit = polish(current.space, _with_more(current, more), segments, _STEPS)
+    begun = _with_more(current, more)
+    fit = go_down(begun, segments)
+    if not is_foretold(begun, fit):
+        fit = Fit.at(fit.space, fit.z, segments, is_rough=True)  # is for intervals only
     if found.accepted:
         found.final, found.fitted_to = fit, segments
     if is_asked:

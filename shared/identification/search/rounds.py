@@ -1,8 +1,10 @@
 """Searches for causes: looks, tries, and judges each on what was held out."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from shared.identification.fitting.fit import Fit, go_down, polish
+from shared.identification.fitting.fit import Fit, polish
 from shared.identification.fitting.refit import Rough, settle
 from shared.identification.fitting.space import Space
 from shared.identification.gate.certainty import SURE, is_there
@@ -139,8 +141,8 @@ def _round(
         return False
     best, rivals = simplest(useful, found.rng)
     rivals = tuple(one for one in rivals if is_rival(found, best, one, train, test))
-    begun = go_down(best.fit, train)  # with the derivative that it has
-    fit = polish(best.fit.space, begun.z, train, 4, enough=1e-4)
+    begun = replace(best.fit, is_rough=True)  # a mended derivative is no better than that
+    fit = polish(begun.space, begun, train, 4, enough=1e-4)
     final = _tried(found, best.screened, fit, best.is_event)
     if final.gain.loss <= best.gain.loss and (best.is_event or _is_useful(found, final)):
         best = final

@@ -62,6 +62,8 @@ class Controllers:
         self.rows = np.empty(0, np.int64)
         """int64[K], the arms in their batch."""
         self._scale = self._offset = np.empty((0, len(plant.joints)))
+        self._ids = np.empty(0, np.int32)
+        self._at_q = self._at_qd = np.ix_(self._ids, self._qpos)
 
     def begin(self, rows: Sequence[Row]) -> None:
         """Take gains and limits of those arms of a batch that trust their encoders.
@@ -72,6 +74,8 @@ class Controllers:
         ours = [row for row in rows if row.encoders is not None]
         self.rows = np.array([row.index for row in ours], np.int64)
         encoders = [row.encoders for row in ours if row.encoders is not None]
+        self._ids = np.arange(2 * len(ours), dtype=np.int32)
+        self._at_q, self._at_qd = (np.ix_(self._ids, each) for each in (self._qpos, self._dofs))
         shape = len(ours), len(self._own)
         self._scale = np.reshape([each.scale for each in encoders], shape)
         self._offset = np.reshape([each.offset for each in encoders], shape)
@@ -92,12 +96,11 @@ class Controllers:
             qvel: float64[K, V].
         """
         count = len(self.rows)
-        ids = np.arange(2 * count, dtype=np.int32)
         said = self._scale * qpos[:, self._own_qpos] + self._offset
         rate_said = self._scale * qvel[:, self._own_dofs]
-        self._q[np.ix_(ids, self._qpos)] = np.concatenate([said, qpos @ self._turns])
-        self._qd[np.ix_(ids, self._dofs)] = np.concatenate([rate_said, qvel @ self._rates])
-        self._command[ids] = np.concatenate([command, command])
-        self._batch.forward(ids)
-        torques = self._torques[np.ix_(ids, self._dofs)]
+        self._q[self._at_q] = np.concatenate([said, qpos @ self._turns])
+        self._qd[self._at_qd] = np.concatenate([rate_said, qvel @ self._rates])
+        self._command[: 2 * count] = np.concatenate([command, command])
+        self._batch.forward(self._ids)
+        torques = self._torques[self._at_qd]
         return np.asarray(torques[:count] - torques[count:], np.float64)

@@ -292,6 +292,7 @@ class Rollouts:
         beside = self._controllers
         if beside is not None and not len(beside.rows):
             beside = None
+        its = rows_of([] if beside is None else beside.rows)
         if begin == 0:  # what the drives do and hold before the first step
             control[arms] = ctrl[:, 0]
             batch.forward(ids)
@@ -303,8 +304,7 @@ class Rollouts:
             drive, speed = np.array(drives[arms, moved]), np.array(qvel[arms, moved])
             change, self._drive_before = drive - self._drive_before, drive
             if beside is not None:
-                its = beside.rows
-                told = control[np.ix_(its, self._columns)]
+                told = control[its][:, self._columns]
                 beyond = beside.beyond_servos(told, qpos[its], qvel[its])
                 added[its] = beyond
                 drive = drive.copy()
