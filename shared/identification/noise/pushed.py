@@ -39,6 +39,11 @@ class Pushed:
     time: float
     """For which they push one way (s)."""
 
+    def torque(self, nominal: Rollouts, joint: str) -> float:
+        """Return the standard deviation of what pushes a logged joint at random (N m)."""
+        model, plant = nominal.model, nominal.plant
+        return self.push * float(model.jnt_actfrcrange[model.joint(plant.mj_joint(joint)).id, 1])
+
 
 def whitening(pushed: Pushed, nominal: Rollouts, q: Float64) -> Float64:
     """Return float64[B, J, J], what makes residuals at postures float64[B, J] of unit variance."""

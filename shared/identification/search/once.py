@@ -11,11 +11,10 @@ import numpy as np
 from shared.identification.effect import IN_RECORDING, ONCE, Candidate
 from shared.identification.fitting.fit import Fit, polish
 from shared.identification.fitting.refit import settle
-from shared.identification.gate.certainty import is_there
 from shared.identification.gate.held_out import plain_stretches, stretches
 from shared.identification.leftover.phases import ONCE as ONE_TIME
 from shared.identification.search.bent import is_worse
-from shared.identification.search.events import SURELY
+from shared.identification.search.events import is_one
 from shared.identification.search.fewer import take_back, without
 from shared.identification.search.judging import judged
 from shared.identification.search.searched import TAKEN_AWAY, Model, Search, Tried, so_far
@@ -106,7 +105,7 @@ def _candidate(found: Search, each: Unexplained) -> Candidate | None:
 def _is_it(before: Fit, fit: Fit, candidate: Candidate, train: tuple[int, ...]) -> bool:
     """Return whether a push is surely there, and explains what was off while it lasted."""
     is_plain = 2.0 * (before.cost - fit.cost) >= _PLAINLY
-    if not is_plain or not is_there(fit, candidate, train, SURELY):
+    if not is_plain or not is_one(candidate, fit, train):
         return False
     problem = fit.space.problem
     off = plain_stretches(problem, before.variant, train)

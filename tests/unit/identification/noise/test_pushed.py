@@ -53,3 +53,8 @@ def test_an_arm_held_by_its_joints_has_no_such_noise(tmp_path: Path):
     held = Rollouts(make_plant(tmp_path), (), 1)
     assert pushed_of(held, [(np.ones((10, 3)), np.zeros((10, 3)))], 1.0) is None
     assert pushed_of(Rollouts(pr2("right", None), (), 1), [], 1.0) is None
+
+
+def test_a_joint_is_pushed_by_a_share_of_its_largest_torque(nominal: Rollouts):
+    largest = TRUE.torque(nominal, "shoulder_lift"), TRUE.torque(nominal, "forearm_roll")
+    assert largest == pytest.approx((0.004 * 11.64, 0.004 * 3.6), rel=0.01)

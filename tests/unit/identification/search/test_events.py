@@ -1,5 +1,8 @@
 """What happened once stands out of a recording, in all channels or in one."""
 
+import copy
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +13,8 @@ from shared.identification.effect import Candidate
 from shared.identification.fitting.fit import Fit, polish
 from shared.identification.fitting.space import Space
 from shared.identification.gate.held_out import plain_channels
-from shared.identification.search.events import Usual, explains_event
+from shared.identification.noise.pushed import Pushed
+from shared.identification.search.events import Usual, explains_event, is_one
 from shared.sim.plant.row import Row
 from tests.measured import measure, problem_of
 
@@ -95,3 +99,19 @@ def test_a_push_of_one_joint_stands_out_and_is_explained_by_itself(pushed: Fit):
 def test_what_leaves_it_or_acts_all_the_time_does_not_explain_it(pushed: Fit):
     assert not is_explained(pushed, _PUSH, np.array([_SIZE[0], _SIZE[1] + 1.5, _SIZE[2]]))
     assert not is_explained(pushed, Candidate(BIAS, "elbow"), _SIZE[:1])
+
+
+def pushed_at_random(fit: Fit, torque: float) -> Fit:
+    """Return a fit whose elbow is pushed at random by a torque (N m), as repeats have shown."""
+    problem = copy.copy(fit.space.problem)
+    model = problem.subject.nominal.model
+    share = torque / float(model.jnt_actfrcrange[model.joint("elbow").id, 1])
+    problem.noise = replace(problem.noise, pushed=Pushed(reading=1e-4, push=share, time=0.2))
+    return replace(fit, space=Space(problem, fit.space.candidates))
+
+
+def test_what_random_torques_do_is_no_push(pushed: Fit):
+    train, found = pushed.space.problem.of("train"), beside(pushed, _PUSH, _SIZE)
+    assert is_one(_PUSH, found, train)
+    assert is_one(_PUSH, pushed_at_random(found, _SIZE[0] / 10.0), train)
+    assert not is_one(_PUSH, pushed_at_random(found, _SIZE[0] / 3.0), train)
