@@ -95,6 +95,11 @@ class Candidate:
         """Return the name of the one recording that it is in, None if it may be in any."""
         return self.place.split(IN_RECORDING, 1)[1] if self.effect.name == ONCE else None
 
+    @property
+    def where(self) -> str:
+        """Return its place, without the recording that it is in if it is in one."""
+        return self.place if self.recording is None else self.place.split(IN_RECORDING, 1)[0]
+
     def forms(self, subject: Subject) -> NDArray[np.bool_]:
         """Return bool[Q], which of its numbers say how, not how much."""
         quantities = self.effect.quantities(subject, self.place)

@@ -30,7 +30,7 @@ _MUCH = 0.01
 that promises less than it is believed."""
 _MENDED = 6
 """The most steps with one derivative."""
-STRAIGHT = 0.15
+_STRAIGHT = 0.15
 """Of a change, that a derivative may be off by to do for good."""
 _NEARLY = 0.01
 """A second start that comes down to so little more than the first one has found the same."""
@@ -180,8 +180,18 @@ def go_down(
 def is_foretold(before: Fit, after: Fit) -> bool:
     """Return whether a fit's derivative foretold what a step changed: it does there, too."""
     came = after.residual - before.residual
-    off = came - before.jacobian @ (after.z - before.z)
-    return float(off @ off) < STRAIGHT**2 * float(came @ came)
+    return is_nearly(came, before.jacobian @ (after.z - before.z))
+
+
+def is_nearly(came: Float64, foretold: Float64) -> bool:
+    """Return whether a change is what a derivative foretold, so that it does where that led, too.
+
+    Args:
+        came: float64[M], by how much residuals changed.
+        foretold: float64[M].
+    """
+    off = came - foretold
+    return float(off @ off) < _STRAIGHT**2 * float(came @ came)
 
 
 def promised(fit: Fit) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.identification.dataset.types import Float64
-from shared.identification.fitting.fit import STRAIGHT, Fit, Start, damped, go_down, promised
+from shared.identification.fitting.fit import Fit, Start, damped, go_down, is_nearly, promised
 from shared.identification.fitting.space import Space
 from shared.identification.fitting.turns import LIKELY, NEAR, aligned, turning_of
 from shared.identification.search.screen import Screened
@@ -194,8 +194,7 @@ def _is_straight(known: Fit, down: Fit) -> bool:
     moved = np.r_[down.z[: known.space.size] - known.z, np.where(is_form, 0.0, extra)]
     rows = len(known.residual) - known.space.size
     came = down.residual[:rows] - known.residual[:rows]
-    off = came - down.jacobian[:rows] @ moved
-    return float(off @ off) < STRAIGHT**2 * float(came @ came)
+    return is_nearly(came, down.jacobian[:rows] @ moved)
 
 
 def _is_there(fit: Fit) -> bool:

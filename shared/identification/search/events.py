@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shared.identification.dataset.types import Float64
-from shared.identification.effect import IN_RECORDING, ONCE, Candidate
+from shared.identification.effect import Candidate
 from shared.identification.fitting.fit import Fit
 from shared.identification.gate.certainty import is_there
 from shared.identification.gate.held_out import plain_channels
@@ -27,8 +27,6 @@ _SURELY = 3.0
 """Standard errors that the torque of what happened once is off nothing by: it is one of many, of
 each joint in each recording. Where nothing did 2.3 passed for a push, of real ones the least sure
 comes to 3.2."""
-
-
 _BEYOND_RANDOM = 5.0
 """Times what pushes a joint at random, by repeats, that something else does. Where nothing did, 1.4
 to 3.3 times passed for a push; a PR2's real ones that were named are 8 to 80 times."""
@@ -89,7 +87,7 @@ def is_one(candidate: Candidate, fit: Fit, train: tuple[int, ...]) -> bool:
     """Return whether what happened once surely did, and is no torque that pushes at random.
 
     Args:
-        candidate: the cause.
+        candidate: the cause, which is in one recording.
         fit: with it.
         train: recordings to fit to.
     """
@@ -97,8 +95,8 @@ def is_one(candidate: Candidate, fit: Fit, train: tuple[int, ...]) -> bool:
         return False
     problem = fit.space.problem
     pushed = problem.noise.pushed
-    if pushed is None or candidate.effect.name != ONCE:
+    if pushed is None:
         return True
-    joint = candidate.place.split(IN_RECORDING, 1)[0]
     torque = fit.space.values(fit.z)[fit.space.candidates.index(candidate)][0]
-    return bool(abs(torque) > _BEYOND_RANDOM * pushed.torque(problem.subject.nominal, joint))
+    usual = pushed.torque(problem.subject.nominal, candidate.where)
+    return bool(abs(torque) > _BEYOND_RANDOM * usual)

@@ -68,11 +68,7 @@ def take_back_pushes(found: Search, left: Sequence[Unexplained]) -> bool:
     """
     train, test = found.problem.of("train"), found.problem.of("test")
     pushed = {each.where for each in left if each.is_external}
-    again = [
-        one
-        for one in found.accepted
-        if one.is_event and one.candidate.place.split(IN_RECORDING, 1)[0] in pushed
-    ]
+    again = [one for one in found.accepted if one.is_event and one.candidate.where in pushed]
     for one in again:
         take_back(found, one, without(found, one, train, test))
     return bool(again)
