@@ -20,49 +20,45 @@ STOPS = (signal.SIGTERM, signal.SIGINT)
 def stop_on_signals(deadline: float = CLOSE_SECONDS) -> Generator[threading.Event]:
     """Turn SIGTERM and SIGINT into an event; a second SIGINT, or the deadline, ends the process.
 
-    Past the deadline the tracebacks of all threads go to stderr and the exit code is 1, even when
-    a library holds the main thread, which then never comes to handle the signal. The interpreter's
-    own end after that has as long again; SIGALRM ends it, for it can hang on a library's threads.
-    Must be entered on the main thread.
+    A thread that the C handler tells does all of it. A handler in Python would run on the main
+    thread alone: not while a library holds it, not before the end of a wait that it had just begun
+    when the signal came, and never where it waits for the lock of an event that it is setting.
+
+    Past the deadline the tracebacks of all threads go to stderr and the exit code is 1. The
+    interpreter's own end after that has as long again; SIGALRM ends it, for it can hang on a
+    library's threads. Must be entered on the main thread.
     """
     stop = threading.Event()
-
-    def handle(number: int, _frame: FrameType | None) -> None:
-        if not stop.is_set():
-            stop.set()
-            atexit.register(signal.alarm, math.ceil(deadline))
-        elif number == signal.SIGINT:
-            os._exit(128 + number)
-
-    with _deadline_from_signal(deadline):
-        before = {sig: signal.signal(sig, handle) for sig in STOPS}
-        try:
-            yield stop
-        finally:
-            for sig, handler in before.items():
-                signal.signal(sig, handler)
-
-
-@contextlib.contextmanager
-def _deadline_from_signal(seconds: float) -> Generator[None]:
-    """Give the block so long from the first signal on, told by the C handler, not by Python's."""
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
 
-    def arm() -> None:
-        while (told := os.read(reading, 1)) and told[0] not in STOPS:
-            pass
-        if told:
-            faulthandler.dump_traceback_later(seconds, exit=True, file=sys.__stderr__ or sys.stderr)
+    def listen() -> None:
+        while told := os.read(reading, 1):
+            number = told[0]
+            if number in STOPS and not stop.is_set():
+                faulthandler.dump_traceback_later(
+                    deadline, exit=True, file=sys.__stderr__ or sys.stderr
+                )
+                atexit.register(signal.alarm, math.ceil(deadline))
+                stop.set()
+            elif number == signal.SIGINT:
+                os._exit(128 + number)
 
-    thread = threading.Thread(target=arm, name="stop-deadline", daemon=True)
+    thread = threading.Thread(target=listen, name="stop-on-signals", daemon=True)
     thread.start()
-    before = signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
+    told_before = signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
+    before = {sig: signal.signal(sig, _leave_to_thread) for sig in STOPS}
     try:
-        yield
+        yield stop
     finally:
-        signal.set_wakeup_fd(before)
+        for sig, handler in before.items():
+            signal.signal(sig, handler)
+        signal.set_wakeup_fd(told_before)
         os.close(writing)
         thread.join()
         faulthandler.cancel_dump_traceback_later()
         os.close(reading)
+
+
+def _leave_to_thread(number: int, frame: FrameType | None) -> None:
+    """Handle a signal of which the thread is told: without a handler in Python it would not be."""

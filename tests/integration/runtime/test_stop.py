@@ -22,9 +22,13 @@ def never_returns():
         ctypes.CDLL(None).pthread_mutex_lock(mutex)
 """
 HANGS_IN_A_LIBRARY = f"""{STUCK}
-import sys
+import sys, threading
 from shared.runtime.stop import stop_on_signals
-with stop_on_signals(deadline=float(sys.argv[1])):
+with stop_on_signals(deadline=float(sys.argv[1])) as stop:
+    def tell():
+        stop.wait(60)
+        print("asked", flush=True)
+    threading.Thread(target=tell, daemon=True).start()
     print("up", flush=True)
     never_returns()
 """
@@ -64,6 +68,15 @@ def test_a_process_that_does_not_stop_is_ended_at_its_deadline_and_says_where(nu
 
 def test_a_second_interrupt_ends_a_process_at_once():
     with hanging(50) as process:
+        process.send_signal(signal.SIGINT)
+        assert process.stdout is not None
+        assert process.stdout.readline() == "asked\n"
+        process.send_signal(signal.SIGINT)
+        assert process.wait(30) == 128 + signal.SIGINT
+
+
+def test_a_second_interrupt_ends_a_process_whose_main_thread_is_stuck_in_a_library():
+    with hanging(50, HANGS_IN_A_LIBRARY) as process:
         process.send_signal(signal.SIGINT)
         assert process.stdout is not None
         assert process.stdout.readline() == "asked\n"

@@ -23,7 +23,8 @@ class Scripted:
         self.closed = 0
 
     def tick(self) -> bool:
-        self.steps.pop(0)()
+        if self.steps:
+            self.steps.pop(0)()
         return True
 
     def health(self) -> Health:
