@@ -51,9 +51,9 @@ class Least(NamedTuple):
 BY_LOSS = Least(at_all=0.04, beside=0.005, noise=1.0)
 """Beside others, since no law is quite the arm's, and one that is off by 7 % of what it does leaves
 so much for another to make up for."""
-FAR_FROM_LINKS = BY_LOSS._replace(at_all=0.02)
+FAR_FROM_LINKS = BY_LOSS._replace(at_all=0.02, noise=FLOOR)
 """The same of a cause that links could make up for on what was held out, but not on what was fitted
-to, near what is known of them."""
+to, near what is known of them: that is sure of it."""
 BY_FOLLOWING = Least(at_all=0.001, beside=0.001, noise=FLOOR)
 """Of a cause that what was held out follows, see ``foretold.py``: it is sure, so small as it is."""
 

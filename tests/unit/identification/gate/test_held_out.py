@@ -59,6 +59,12 @@ def test_a_small_cause_passes_by_its_loss_where_links_cannot_make_up_for_it(
     assert not replace(found, is_far_from_links=True, loss=1.04).is_useful(1.05)
 
 
+def test_what_links_could_not_make_up_for_need_not_explain_what_a_right_model_may_leave():
+    found = Gain(1.106, 1.133, 0.0, 0.05, 0.01, 0.01, is_measured=True)
+    assert not found.is_useful(1.133)  # less than a quarter of 0.133
+    assert replace(found, is_far_from_links=True).is_useful(1.133)
+
+
 def test_beside_a_far_larger_cause_a_quarter_of_what_noise_does_not_account_for_is_of_use():
     def gain(before: float, loss: float, is_measured: bool) -> Gain:
         return Gain(loss, before, 0.0, 0.0, 0.2, 0.1, is_measured)
