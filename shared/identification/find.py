@@ -25,6 +25,7 @@ from shared.identification.search.again import fresh, leave_out
 from shared.identification.search.bare import counted_by_torque
 from shared.identification.search.begin import begin, begin_without, doubted_of
 from shared.identification.search.bent import far_from_file, is_worse, otherwise, worse_than_file
+from shared.identification.search.likeness import is_only_like
 from shared.identification.search.once import is_named, take_back_pushes, take_pushes
 from shared.identification.search.rounds import search
 from shared.identification.search.searched import Search, is_open
@@ -90,6 +91,8 @@ def identify(
             found, left = other, other_left
     if not found.accepted and not is_open(found):
         found.otherwise = otherwise(found, progress)
+    if not is_open(found) and not any(found.rivals):
+        found.is_only_like = is_only_like(found)
     clock.over("search")
     progress("diagnostics", 0.0)
     evidence = _evidence(found)

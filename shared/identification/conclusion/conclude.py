@@ -56,7 +56,7 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
     told = accepted if word == "unexplained" else sure
     return Conclusion(
         word=word,
-        sentence=sentence_of(word, told, ties, held_out, left),
+        sentence=sentence_of(word, told, ties, held_out, left, found.is_only_like),
         causes=sure if word in ("named", "tie") else (),
         ties=ties if word == "tie" else (),
         held_out=held_out,
@@ -91,7 +91,7 @@ def extended(found: Search) -> Variant:
 
 def _word(found: Search, ties: tuple[Tie, ...], left: tuple[Unexplained, ...]) -> Word:
     if found.accepted:
-        if is_open(found):
+        if is_open(found) or found.is_only_like:
             return "unexplained"
         return "tie" if ties else "named"
     if is_open(found):
@@ -191,6 +191,8 @@ def _why_not(
 ) -> str:
     base = float(found.base_losses.mean())
     if label in accepted:
+        if found.is_only_like:
+            return "what it leaves goes along with what other causes would do there"
         return "" if word == "named" else "too much is left over with it" * (word == "unexplained")
     if label in rivals:
         return f"does as well as what was taken, within {ALIKE:.0%} of the gain or its error"

@@ -18,8 +18,18 @@ def sentence_of(
     ties: tuple[Tie, ...],
     held_out: HeldOut,
     left: tuple[Unexplained, ...],
+    is_only_like: bool = False,
 ) -> str:
-    """Return the verdict for people."""
+    """Return the verdict for people.
+
+    Args:
+        word: the verdict.
+        causes: that are told of.
+        ties: what is not told apart.
+        held_out: how much is left.
+        left: where.
+        is_only_like: whether the causes stand in for a law that is not known.
+    """
     floor = "the noise" if held_out.is_floor_measured else "what the base fit usually leaves"
     ratio = f"{held_out.base_fit:.2f} times {floor}"
     if word == "named":
@@ -46,6 +56,8 @@ def sentence_of(
         why = "which is too much to believe it"
         if held_out.extended >= held_out.nominal:
             why = f"and the model file as it is {held_out.nominal:.2f}"
+        elif is_only_like:
+            why = "which is no noise: it goes along with what other causes would do there"
         return (
             f"Something is wrong that no effect of the catalogue explains. Nearest comes {names}, "
             f"but from {ratio} it leaves {held_out.extended:.2f}, {why}."

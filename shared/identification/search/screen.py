@@ -103,8 +103,8 @@ def screen(
     rows = shown_rows(fit, segments)
     subject = fit.space.problem.subject
     lasting = [each for each in candidates if each.recording is None]
-    steady = [each for each in lasting if _is_steady(subject, each)]
-    local = [each for each in lasting if not _is_steady(subject, each)]
+    steady = [each for each in lasting if is_steady(subject, each)]
+    local = [each for each in lasting if not is_steady(subject, each)]
     part = fit.on(rows)
     if seen is not None and fit.is_near_noise:
         steady = _once_more(part, steady, seen.steady, _AGAIN)
@@ -190,7 +190,7 @@ def of_recording(fit: Fit, name: str | None, segments: tuple[int, ...]) -> tuple
     return tuple(each for each in segments if names[problem.segments[each].trajectory] == name)
 
 
-def _is_steady(subject: Subject, candidate: Candidate) -> bool:
+def is_steady(subject: Subject, candidate: Candidate) -> bool:
     """Return whether a candidate acts at any size."""
     found = candidate.effect.quantities(subject, candidate.place)
     return all(each.is_smooth for each in found)

@@ -189,6 +189,8 @@ class Search:
     by_all: ByAll | None = None
     """What the current model leaves once it is fitted to all recordings; None where it was not
     asked."""
+    is_only_like: bool = False
+    """Whether what was accepted only stands in for a law that is not known (``likeness.py``)."""
 
     @property
     def base_parts(self) -> Fit:
