@@ -14,14 +14,14 @@ from shared.identification.search.searched import Search
 
 _EACH = 4.0
 """What each way in which other laws move the residual takes off the cost: noise has half of one.
-Where the right law was named it is 0.3 to 2.8 in 44 of 48 data sets, and up to 24 in four in which
-the cause is so large that what the simulation is off by shows; where a wrong one stood for it, 1.2
-to 10."""
+Where the right law was named it is 0.3 to 2.8 in 44 of 47 data sets, and up to 24 in three in
+which the cause is so large that what the simulation is off by shows; where a wrong one stood for
+it, 1.2 to 10."""
 _BY_CHANCE = 1.5
 """The same, with a base that is a little off, where the law is right."""
 _SHARE = 0.03
 """Of what the causes took off the cost: a law that is off by 17 % of what it does leaves so much,
-and no law is quite the arm's. Of those four it is 0.02 at most."""
+and no law is quite the arm's. Of those three it is 0.02 at most."""
 _SEEN = 1.0
 """What a law moves the residual by, at least, to be one of them, in standard deviations of it."""
 _RANK = 0.1
