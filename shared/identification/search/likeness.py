@@ -33,10 +33,11 @@ def is_only_like(found: Search) -> bool:
 
     Args:
         found: a search that is over. Of one that named nothing, or only what happened once, or
-            where repeats do not say what noise is, there is nothing to ask.
+            where repeats do not say what noise is, there is nothing to ask. Nor of what is at no
+            joint: a tracker drifts the way that frames and tools are off.
     """
     fit, problem = found.current, found.problem
-    places = {one.candidate.place for one in found.accepted if not one.is_event}
+    places = {one.candidate.place for one in found.accepted if not one.is_event} - {""}
     if not places or not problem.noise.is_white:
         return False
     others = [

@@ -5,7 +5,9 @@ import pytest
 
 from shared.identification.catalogue.joint_spring import EFFECT as JOINT_SPRING
 from shared.identification.catalogue.nonlinear_viscous import EFFECT as NONLINEAR
+from shared.identification.catalogue.tool_offset import EFFECT as TOOL_OFFSET
 from shared.identification.catalogue.torque_bias import EFFECT as BIAS
+from shared.identification.catalogue.tracker_frame import EFFECT as TRACKER_FRAME
 from shared.identification.effect import Candidate
 from shared.identification.fitting.fit import polish
 from shared.identification.fitting.space import Space
@@ -15,6 +17,7 @@ from shared.sim.plant.row import Row
 from tests.measured import measure, plain, problem_of
 from tests.searches import Searches
 
+FRAME = Candidate(TRACKER_FRAME, "")
 TORQUE, DRAG = Candidate(BIAS, "elbow"), Candidate(NONLINEAR, "elbow")
 SPRING = Candidate(JOINT_SPRING, "elbow")
 
@@ -60,6 +63,12 @@ def test_a_cause_is_the_law_where_no_other_explains_what_it_leaves(searches: Sea
 def test_of_causes_at_other_joints_nothing_is_asked(searches: Searches):
     found = named(searches, TORQUE)
     found.candidates = (TORQUE, Candidate(NONLINEAR, "lift"))
+    assert not is_only_like(found)
+
+
+def test_of_what_is_at_no_joint_nothing_is_asked(searches: Searches):
+    found = named(searches, FRAME)
+    found.candidates = (*found.candidates, Candidate(TOOL_OFFSET, ""))
     assert not is_only_like(found)
 
 
