@@ -21,10 +21,6 @@ from shared.sim.plant.rollouts import Reports
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import pose_error, sampled
 
-_HELD = 4.0
-"""The most that noise spreads in a part of an arm that is held by its tool: damping takes a wrong
-speed away, but where the arm gives random torques leave four to five floors."""
-
 
 @dataclass(frozen=True)
 class Track:
@@ -146,8 +142,6 @@ def _joints(problem: Problem, segment: int, reports: Reports) -> tuple[Float64, 
     middles = block_means(at, recorded.joints_at[:, None], BLOCK)[:, 0]
     if recorded.begin > 0.0:
         spread = _spread(at, middles, CUTS.get(problem.subject.control, CUT))
-        if problem.subject.control == "pose":
-            spread = np.minimum(spread, _HELD)
         if not problem.noise.is_measured:  # then the floor is what parts leave, spread and all
             spread /= np.median(spread)
         x /= spread[:, None]
@@ -164,7 +158,7 @@ def _spread(at: Float64, middles: Float64, cut: Cut) -> Float64:
     unit = np.eye(width)[:, width // 2 : width // 2 + 1]
     readings = max(BLOCK / period, 1.0)
     of_rate = float(np.linalg.norm(smooth(unit, width, period))) * np.sqrt(readings)
-    return np.sqrt(1.0 + (of_rate * middles) ** 2)
+    return np.minimum(np.sqrt(1.0 + (of_rate * middles) ** 2), cut.spread)
 
 
 def _behind(
