@@ -89,10 +89,11 @@ def identify(
         other, other_left = _searched(other, seed, progress, clock)
         if not is_open(other):
             found, left = other, other_left
-    if not found.accepted and not is_open(found):
-        found.otherwise = otherwise(found, progress)
-    if not is_open(found) and not any(found.rivals):
-        found.is_only_like = is_only_like(found)
+    if not is_open(found):
+        if not found.accepted:
+            found.otherwise = otherwise(found, progress)
+        elif not any(found.rivals):
+            found.is_only_like = is_only_like(found)
     clock.over("search")
     progress("diagnostics", 0.0)
     evidence = _evidence(found)

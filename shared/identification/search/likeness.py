@@ -44,17 +44,15 @@ def is_only_like(found: Search) -> bool:
         each
         for each in found.candidates
         if each.place in places
-        and each.recording is None
         and each not in fit.space.candidates
         and is_steady(problem.subject, each)
     ]
-    looked = columns_of(fit, looks_of(problem.subject, others), problem.of("train"))
-    moved = [row for looks in looked.values() for each in looks for row in each.columns]
-    if not moved:
+    if not others:
         return False
+    looked = columns_of(fit, looks_of(problem.subject, others), problem.of("train"))
+    moved = np.concatenate([each.columns for looks in looked.values() for each in looks])
     base, _ = np.linalg.qr(fit.jacobian)
-    padded = np.pad(np.array(moved), ((0, 0), (0, fit.space.size)))
-    ways = without(base, padded.T)
+    ways = without(base, np.pad(moved, ((0, 0), (0, fit.space.size))).T)
     ways = ways[:, np.linalg.norm(ways, axis=0) > _SEEN]
     if not ways.shape[1]:
         return False
