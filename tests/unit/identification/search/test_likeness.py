@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from shared.identification.catalogue.gravity_tilt import EFFECT as GRAVITY_TILT
 from shared.identification.catalogue.joint_spring import EFFECT as JOINT_SPRING
 from shared.identification.catalogue.nonlinear_viscous import EFFECT as NONLINEAR
 from shared.identification.catalogue.tool_offset import EFFECT as TOOL_OFFSET
@@ -17,7 +18,7 @@ from shared.sim.plant.row import Row
 from tests.measured import measure, plain, problem_of
 from tests.searches import Searches
 
-FRAME = Candidate(TRACKER_FRAME, "")
+TILT = Candidate(GRAVITY_TILT, "")
 TORQUE, DRAG = Candidate(BIAS, "elbow"), Candidate(NONLINEAR, "elbow")
 SPRING = Candidate(JOINT_SPRING, "elbow")
 
@@ -67,8 +68,8 @@ def test_of_causes_at_other_joints_nothing_is_asked(searches: Searches):
 
 
 def test_of_what_is_at_no_joint_nothing_is_asked(searches: Searches):
-    found = named(searches, FRAME)
-    found.candidates = (*found.candidates, Candidate(TOOL_OFFSET, ""))
+    found = named(searches, TILT)
+    found.candidates = (TILT, Candidate(TOOL_OFFSET, ""), Candidate(TRACKER_FRAME, ""))
     assert not is_only_like(found)
 
 
