@@ -9,7 +9,7 @@ from shared.identification.arm.subject import subject_of
 from shared.identification.catalogue import effects
 from shared.identification.dataset.types import Dataset, Float64, ModelSource, Split, Trajectory
 from shared.identification.effect import Candidate
-from shared.identification.fitting.fit import floor_from_base
+from shared.identification.fitting.base import floor_from_base
 from shared.identification.fitting.parameters import base_parameters
 from shared.identification.fitting.problem import BLOCK, Problem
 from shared.identification.fitting.space import Space

@@ -14,7 +14,8 @@ import numpy as np
 from benchmarks.fits.arm import JOINTS
 from shared.identification.arm.subject import subject_of
 from shared.identification.dataset.reading import read_dataset
-from shared.identification.fitting.fit import WINDOW, polish
+from shared.identification.fitting.base import WINDOW
+from shared.identification.fitting.fit import polish
 from shared.identification.fitting.parameters import base_parameters
 from shared.identification.fitting.problem import BLOCK, Problem
 from shared.identification.fitting.space import Space

@@ -9,7 +9,7 @@ import numpy as np
 
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
-from shared.identification.fitting.fit import BaseFits, fit_with
+from shared.identification.fitting.base import BaseFits, fit_with
 from shared.identification.fitting.parameters import LOOSE, BaseParameter
 from shared.identification.fitting.space import Space
 from shared.sim.plant.row import Row

@@ -5,7 +5,7 @@ from pathlib import Path
 import msgspec
 
 from shared.identification.dataset.types import Dataset
-from shared.identification.fitting.fit import SavedFits
+from shared.identification.fitting.base import SavedFits
 from shared.identification.search.searched import Search
 from shared.runtime.files import atomic_write
 

@@ -16,7 +16,8 @@ import numpy as np
 
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
-from shared.identification.fitting.fit import Fit, floor_at, polish
+from shared.identification.fitting.base import floor_at
+from shared.identification.fitting.fit import Fit, polish
 from shared.identification.fitting.space import Space
 from shared.identification.fitting.torques import by_torques
 from shared.identification.gate.certainty import is_there

@@ -8,16 +8,16 @@ import numpy as np
 from shared.identification.arm.subject import subject_of
 from shared.identification.dataset.types import Dataset
 from shared.identification.effect import Candidate, Effect
-from shared.identification.fitting.creep import creep_of, with_creep
-from shared.identification.fitting.fit import (
+from shared.identification.fitting.base import (
     BaseFits,
-    Fit,
     SavedFits,
     fit_again,
     fit_base,
     fit_without,
     floor_from_base,
 )
+from shared.identification.fitting.creep import creep_of, with_creep
+from shared.identification.fitting.fit import Fit
 from shared.identification.fitting.parameters import BaseParameter, base_parameters, bends
 from shared.identification.fitting.problem import BLOCK, Problem
 from shared.identification.fitting.space import Space

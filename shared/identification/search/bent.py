@@ -16,7 +16,8 @@ from shared.identification.arm.places import moving
 from shared.identification.conclusion.causes import motion, rival
 from shared.identification.conclusion.sentence import label
 from shared.identification.dataset.types import Float64
-from shared.identification.fitting.fit import WINDOW, Fit, go_down, polish
+from shared.identification.fitting.base import WINDOW
+from shared.identification.fitting.fit import Fit, go_down, polish
 from shared.identification.fitting.parameters import INERTIA_PRIOR, BaseParameter, base_parameters
 from shared.identification.fitting.problem import Problem
 from shared.identification.fitting.space import Space

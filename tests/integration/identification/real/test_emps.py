@@ -8,7 +8,8 @@ from scipy.io import loadmat
 
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.find import identify
-from shared.identification.fitting.fit import floor_from_base, polish
+from shared.identification.fitting.base import floor_from_base
+from shared.identification.fitting.fit import polish
 from shared.identification.fitting.problem import Problem
 from shared.identification.fitting.space import Space
 from shared.identification.leftover.located import leftovers

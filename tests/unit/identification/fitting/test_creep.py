@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shared.identification.fitting.base import BaseFits
 from shared.identification.fitting.creep import creep_of, with_creep
-from shared.identification.fitting.fit import BaseFits, Start, polish
+from shared.identification.fitting.fit import Start, polish
 from shared.identification.fitting.parameters import enter_base
 from shared.identification.fitting.problem import Problem
 from shared.identification.fitting.space import Space

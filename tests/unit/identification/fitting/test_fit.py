@@ -9,16 +9,14 @@ import pytest
 
 from shared.identification.arm.subject import recorded_of, subject_of
 from shared.identification.dataset.types import Dataset, Float64, ModelSource, Trajectory
-from shared.identification.fitting.cmaes import minimize
-from shared.identification.fitting.fit import (
+from shared.identification.fitting.base import (
     BaseFits,
-    Fit,
-    Start,
     _from_elsewhere,  # pyright: ignore[reportPrivateUsage]
     _usual_power,  # pyright: ignore[reportPrivateUsage]
     fit_without,
-    polish,
 )
+from shared.identification.fitting.cmaes import minimize
+from shared.identification.fitting.fit import Fit, Start, polish
 from shared.identification.fitting.parameters import base_parameters, enter_base
 from shared.identification.fitting.problem import Problem
 from shared.identification.fitting.space import Space

@@ -1,0 +1,199 @@
+"""Fits the base: CMA-ES as in the paper, then least squares from several starts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shared.identification.dataset.types import Float64
+from shared.identification.fitting.cmaes import minimize
+from shared.identification.fitting.fit import ENOUGH, Fit, Start, go_down, polish
+from shared.identification.fitting.space import Space
+from shared.identification.noise.floor import Noise
+from shared.sim.plant.plant import Control
+
+_MEDIAN = 0.455
+"""Of the square of a normal number of variance 1."""
+WINDOW = 1.0
+"""Of the parts that a fit begins with (s)."""
+_NEARLY = 0.01
+"""A second start that comes down to so little more than the first one has found the same."""
+AGREE = 0.02
+"""Starts agree whose costs differ by less than this share."""
+
+
+@dataclass(frozen=True)
+class BaseFits:
+    """The base at its best, on short parts and on whole recordings."""
+
+    nominal: Start
+    """On short parts."""
+    parts: Fit
+    whole: Fit
+
+
+def floor_from_base(space: Space) -> Noise:
+    """Return a noise floor for recordings of which none is a repeat: what the base leaves.
+
+    How far below that a right model would come is not known, so causes are judged only by how
+    much better they are, not by what they leave.
+    """
+    parts = _on_parts(space)
+    return floor_at(space, polish(parts, np.zeros(space.size), parts.problem.of("train"), 4).z)
+
+
+def floor_at(space: Space, z: Float64) -> Noise:
+    """Return the same from what is left at a vector, float64[n]."""
+    parts = _on_parts(space)
+    problem, noise = parts.problem, parts.problem.noise
+    each = problem.residuals([parts.variant(z)], problem.of("train"))[0]
+    scale = np.maximum(np.sqrt(_usual_power(each, problem.subject.control) / _MEDIAN), 1.0)
+    count = len(noise.joints)
+    tracker = None if noise.tracker is None else noise.tracker * scale[count:]
+    return replace(noise, joints=noise.joints * scale[:count], tracker=tracker)
+
+
+def _usual_power(parts: list[Float64], control: Control) -> Float64:
+    """Return float64[C], the median of squares, block by block where nothing holds the arm.
+
+    Under torques what is usual at the end of a part is many times what is usual at its begin.
+    """
+    if control != "torque":
+        return np.median(np.concatenate(parts) ** 2, axis=0)
+    shortest = min(len(part) for part in parts)
+    return np.median([part[:shortest] ** 2 for part in parts], axis=0).mean(axis=0)
+
+
+@dataclass(frozen=True)
+class SavedFits:
+    """What it takes to have a base fit again."""
+
+    names: tuple[str, ...]
+    """Of the parameters."""
+    parts: tuple[float, ...]
+    whole: tuple[float, ...]
+    starts_agree: bool
+    is_torque: bool = False
+    """Whether noise was torques, see :class:`Noise`."""
+
+
+def fit_again(space: Space, saved: SavedFits) -> BaseFits:
+    """Return a base fit that was found before."""
+    problem = space.problem
+    parts = _on_parts(space)
+    origin, pieces = np.zeros(space.size), parts.problem.of("train")
+    nominal = Start(origin, parts.jacobian(origin, pieces, is_rough=True)[1])
+    begun = Fit.at(parts, np.array(saved.parts), pieces)
+    whole = Fit.at(space, np.array(saved.whole), problem.of("train"))
+    return BaseFits(nominal, begun, replace(whole, starts_agree=saved.starts_agree))
+
+
+def fit_base(space: Space, rng: np.random.Generator) -> BaseFits:
+    """Return the base's fit on the training recordings, the better one of two starts.
+
+    One start is nominal and goes by way of short parts that each begin at the measured state:
+    there the arm cannot get far from what was measured, and the loss is nearly a parabola. The
+    other is found by CMA-ES.
+    """
+    problem = space.problem
+    first = problem.segments[problem.of("train")[0]].trajectory
+    segments = tuple(
+        index for index in problem.of("train") if problem.segments[index].trajectory == first
+    )
+    seed = int(rng.integers(1, 2**31 - 1))
+    rough = problem.rough_timestep  # does for a start
+
+    def losses(zs: Float64) -> Float64:
+        found = space.residual([space.clip(z) for z in zs], segments, rough)
+        return np.sum(np.minimum(found**2, 1e8), axis=1)
+
+    origin = np.zeros(space.size)
+    searched = minimize(losses, origin, *space.bounds, sigma=0.3, seed=seed)
+    return _fitted(space, searched)
+
+
+def fit_without(space: Space, done: BaseFits, doubted: Sequence[int]) -> BaseFits:
+    """Return the base's fit without parameters that it had, from its best with them.
+
+    Args:
+        space: without them.
+        done: with them.
+        doubted: which of its coordinates they were.
+    """
+    begun, best = (np.delete(fit.z, doubted) for fit in (done.parts, done.whole))
+    parts = _on_parts(space)
+    near = polish(parts, begun, parts.problem.of("train"), 6)
+    is_same = parts.problem is space.problem
+    whole = near if is_same else polish(space, best, space.problem.of("train"), 6)
+    nominal = _start_without(done.nominal, doubted)
+    return BaseFits(nominal, near, replace(whole, starts_agree=done.whole.starts_agree))
+
+
+def fit_with(space: Space, done: BaseFits, start: Float64) -> BaseFits:
+    """Return the base's fit with more parameters, from its best without them.
+
+    Args:
+        space: with them, after those that it had.
+        done: without.
+        start: float64[K], where they begin.
+    """
+    parts, origin = _on_parts(space), np.zeros(space.size)
+    pieces = parts.problem.of("train")
+    nominal = Start(origin, parts.jacobian(origin, pieces, is_rough=True)[1])
+    near = polish(parts, np.r_[done.parts.z, start], pieces, 6)
+    is_same = parts.problem is space.problem
+    begun = np.r_[done.whole.z, start]
+    whole = near if is_same else polish(space, begun, space.problem.of("train"), 6)
+    return BaseFits(nominal, near, replace(whole, starts_agree=done.whole.starts_agree))
+
+
+def _start_without(start: Start, gone: Sequence[int]) -> Start:
+    """Return the derivative at a vector in which some coordinates are 0, without those."""
+    priors = [len(start.jacobian) - start.z.size + index for index in gone]
+    kept = np.delete(np.delete(start.jacobian, gone, axis=1), priors, axis=0)
+    return Start(np.delete(start.z, gone), kept)
+
+
+def _fitted(space: Space, searched: Float64) -> BaseFits:
+    """Return the better one of two fits: from nominal by way of short parts, and directly."""
+    problem = space.problem
+    segments = problem.of("train")
+    parts, origin = _on_parts(space), np.zeros(space.size)
+    pieces = parts.problem.of("train")
+    at_nominal = Fit.at(parts, origin, pieces, is_rough=True)
+    begun = polish(parts, at_nominal, pieces, 6)
+    is_same = parts.problem is problem
+    first = begun if is_same else polish(space, begun.z, segments, 6)
+    fits = [first, _from_elsewhere(space, searched, first, segments)]
+    best = min(fits, key=lambda fit: fit.cost)
+    agree = max(fit.cost for fit in fits) <= _as_good(best.cost)
+    nominal = Start(origin, at_nominal.jacobian)
+    return BaseFits(nominal, best if is_same else begun, replace(best, starts_agree=agree))
+
+
+def _from_elsewhere(space: Space, start: Float64, first: Fit, segments: tuple[int, ...]) -> Fit:
+    """Return a fit from a second start: the first one, where it comes as far down as that.
+
+    It goes down with the first one's derivative, then with its own.
+    """
+    z = space.clip(start)
+    residual = space.residual([z], segments)[0]
+    found = fit = go_down(Fit.of(space, z, residual, first.jacobian), segments)
+    for _ in range(6):
+        if first.cost * (1 - ENOUGH) < found.cost < first.cost * (1 + _NEARLY):
+            return first
+        fit = Fit.at(space, found.z, segments, is_rough=True)
+        found = go_down(fit, segments)
+        if not found.cost < fit.cost * (1 - ENOUGH):
+            break
+    return polish(space, fit, segments, 6) if fit.is_rough and fit.cost < first.cost else fit
+
+
+def _as_good(cost: float) -> float:
+    """Return up to which cost another fit is as good as one."""
+    return cost * (1 + AGREE) + 1.0
+
+
+def _on_parts(space: Space) -> Space:
+    """Return the same on short parts, unless recordings come in such already."""
+    return Space(space.problem.in_parts(WINDOW), space.candidates)
