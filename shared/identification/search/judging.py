@@ -20,6 +20,8 @@ takes off some 30."""
 _PLAINLY, _PLAINLY_EACH = 20.0, 4.0
 """Twice what a cause takes off the cost, at least, and more for each of its numbers: of a hundred
 candidates where there is none, the best takes off some 15."""
+_WORSE = 1.65
+"""Standard errors by which a cause may make all that was held out worse."""
 
 
 class Judged(NamedTuple):
@@ -62,7 +64,7 @@ def judged(found: Search, candidate: Candidate, before: Model, after: Model) -> 
         gain,
         surely=surely,
         is_measured=found.problem.noise.is_measured,
-        apart=_apart(found, candidate, after.fit, foretold),
+        apart=None if _is_surely_worse(gain) else _apart(found, candidate, after.fit, foretold),
         is_far_from_links=_is_far_from_links(before.fit, after.fit, foretold),
     )
     return Judged(gain, more.after, foretold)
@@ -84,6 +86,11 @@ def _is_far_from_links(before: Fit, after: Fit, foretold: Foretold | None) -> bo
     if foretold is None or foretold.is_told:
         return False
     return before.cost - after.cost >= _NO_LINKS
+
+
+def _is_surely_worse(gain: Gain) -> bool:
+    """Return whether held-out motion gets surely worse (95 %): then no small part of it counts."""
+    return gain.gain < -_WORSE * gain.error
 
 
 def _apart(

@@ -11,7 +11,6 @@ from shared.identification.fitting.parameters import bends
 from shared.identification.fitting.refit import settle
 from shared.identification.fitting.turns import LATE
 from shared.identification.gate.certainty import SURE
-from shared.identification.gate.foretold import SURELY
 from shared.identification.gate.held_out import compare, stretches
 from shared.identification.search.searched import (
     ALIKE,
@@ -37,6 +36,8 @@ _BENT = 15.0
 _LOADS = {"counterbalance", "torque_bias", "gravity_tilt", "joint_spring"}
 """Causes of which none is told from the others by a few postures: near one of them a load that
 depends on posture is a constant torque, whatever numbers either has."""
+_LOADS_APART = 4.5
+"""Standard errors by which all recordings together have to prefer one of two loads."""
 _STANDS_OFF = {
     frozenset({"encoder_offset", "payload"}): ALIKE,
     frozenset({"encoder_offset", "backlash"}): 0.1,
@@ -115,7 +116,7 @@ def _outdoes(better: Tried, other: Tried, is_apart: bool, rng: np.random.Generat
     margin = compare(other.held(is_apart), better.held(is_apart), rng)
     held = margin.gain / max(margin.error, 1e-12)
     if names <= _LOADS:
-        is_sure = math.sqrt(2.0 * apart) + held >= SURELY
+        is_sure = math.sqrt(2.0 * apart) + held >= _LOADS_APART
     else:
         more = max(better.numbers - other.numbers - 1, 0)
         is_sure = apart >= _FITTED_FAR_BETTER + EACH_MORE * more

@@ -59,10 +59,10 @@ def test_what_explains_the_recordings_that_were_fitted_to_worse_is_not_sure(tmp_
 @pytest.mark.parametrize(
     ("fitted", "errors", "share", "kept", "is_followed", "is_sure"),
     [
-        (2.0, 3.0, 0.8, 1.0, True, True),
-        (3.5, 1.8, 0.8, 1.0, True, True),  # surer by what was fitted to, and the other way round
-        (1.0, 4.0, 0.8, 1.0, True, True),
-        (1.8, 2.6, 0.8, 1.0, False, True),  # then the loss itself has to say so
+        (2.7, 3.0, 0.8, 1.0, True, True),
+        (3.8, 1.8, 0.8, 1.0, True, True),  # surer by what was fitted to, and the other way round
+        (1.0, 4.6, 0.8, 1.0, True, True),
+        (2.7, 2.6, 0.8, 1.0, False, True),  # then the loss itself has to say so
         (9.0, 1.0, 0.8, 1.0, False, False),  # what goes there the base could do as well
         (9.0, 1.0, 0.8, 0.05, False, True),  # it is a link that weighs more: that does not show
         (9.0, 9.0, 0.2, 1.0, False, False),
@@ -85,6 +85,26 @@ def test_a_cause_is_followed_by_what_was_fitted_to_and_what_was_held_out_togethe
     assert (gain.apart is not None) == is_followed
     assert gain.apart is None or gain.apart.gain == pytest.approx(0.5)
     assert gain.is_sure == is_sure
+
+
+@pytest.mark.parametrize(
+    ("left", "is_followed"),
+    [
+        (_USUAL + 0.1 * np.sin(2.0 * np.arange(22.0)), True),  # as much as before
+        (_USUAL + 0.1, False),  # more in every stretch
+    ],
+)
+def test_what_makes_all_that_was_held_out_surely_worse_is_not_followed(
+    tmp_path, monkeypatch, left, is_followed: bool
+):
+    searches = Searches(tmp_path)
+    found = searches.search(_USUAL)
+    told = Foretold(9.0, 0.8, 1.0, _USUAL + 0.5, _USUAL)
+    monkeypatch.setattr(judging, "_foretold", lambda *rest: told)
+    monkeypatch.setattr(judging, "sureness", lambda *rest: 9.0)
+    after = Model(_fitted(searches), left)
+    gain = judged(found, ELBOW, Model(searches.base, _USUAL), after).gain
+    assert (gain.apart is not None) == is_followed
 
 
 @pytest.mark.parametrize(
