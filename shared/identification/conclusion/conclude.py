@@ -192,7 +192,7 @@ def _why_not(
     base = float(found.base_losses.mean())
     if label in accepted:
         if found.is_only_like:
-            return "what it leaves goes along with what other causes would do there"
+            return "other effects at its joint fit what it leaves by more than chance"
         return "" if word == "named" else "too much is left over with it" * (word == "unexplained")
     if label in rivals:
         return f"does as well as what was taken, within {ALIKE:.0%} of the gain or its error"

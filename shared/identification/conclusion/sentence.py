@@ -57,7 +57,7 @@ def sentence_of(
         if held_out.extended >= held_out.nominal:
             why = f"and the model file as it is {held_out.nominal:.2f}"
         elif is_only_like:
-            why = "which is no noise: it goes along with what other causes would do there"
+            why = "which is not noise: other effects at the same joint fit that by more than chance"
         return (
             f"Something is wrong that no effect of the catalogue explains. Nearest comes {names}, "
             f"but from {ratio} it leaves {held_out.extended:.2f}, {why}."

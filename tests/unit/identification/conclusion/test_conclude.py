@@ -47,9 +47,9 @@ def test_a_cause_that_is_only_like_what_is_wrong_is_told_but_not_named(searches:
     found = conclude(search, ())
     assert (found.word, found.causes) == ("unexplained", ())
     assert "Nearest comes torque bias of elbow" in found.sentence
-    assert "which is no noise" in found.sentence
+    assert "which is not noise" in found.sentence
     (scored,) = (each for each in found.candidates if each.where == "elbow")
-    assert "goes along with what other causes" in scored.why_not
+    assert "by more than chance" in scored.why_not
 
 
 def test_a_base_at_the_noise_has_nothing_to_name(searches: Searches):
