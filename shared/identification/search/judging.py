@@ -98,10 +98,11 @@ def _apart(
 ) -> Taken | None:
     """Return what a cause takes off that what was held out surely follows, however little.
 
-    The surer that is, the less sure the recordings need to be that were fitted to, and the other
-    way round.
+    Not where base and links could make up for nearly all of it: of that nothing is followed. The
+    surer it is, the less sure the recordings need to be that were fitted to, and the other way
+    round.
     """
-    if foretold is None or not foretold.is_seen:
+    if foretold is None or not (foretold.is_told and foretold.is_seen):
         return None
     fitted = sureness(after, candidate, found.problem.of("train"))
     if fitted + foretold.errors < SURELY:

@@ -66,6 +66,7 @@ def test_what_explains_the_recordings_that_were_fitted_to_worse_is_not_sure(tmp_
         (9.0, 1.0, 0.8, 1.0, False, False),  # what goes there the base could do as well
         (9.0, 1.0, 0.8, 0.05, False, True),  # it is a link that weighs more: that does not show
         (9.0, 9.0, 0.2, 1.0, False, False),
+        (9.0, 9.0, 0.8, 0.05, False, True),  # nearly all of it links could do: that says nothing
     ],
 )
 def test_a_cause_is_followed_by_what_was_fitted_to_and_what_was_held_out_together(
