@@ -12,7 +12,9 @@ from shared.identification.effect import Candidate
 from shared.identification.fitting.fit import polish
 from shared.identification.gate.certainty import half_widths, is_there
 from shared.identification.gate.held_out import stretches
+from shared.identification.search import fewer
 from shared.identification.search.fewer import one_for_many, prune, tell_apart
+from shared.identification.search.judging import Judged
 from shared.identification.search.searched import Search
 from shared.sim.plant.row import Row
 from tests.searches import DRAG, ELBOW, LIFT, Searches
@@ -115,6 +117,30 @@ def test_a_cause_that_may_as_well_be_nothing_is_taken_back(searches: Searches, w
         assert not found.accepted
         assert found.current is found.base
         assert found.current_losses is found.base_losses
+
+
+@pytest.mark.parametrize("pulled", [0.0, 1.0])
+def test_a_cause_without_which_the_rest_does_much_worse_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pulled: float
+):
+    """However seldom it is seen, as a drive's limit that one swing reaches."""
+
+    def pull(row: Row) -> None:
+        ELBOW.effect.enter(row, ELBOW.place, np.array([pulled]))
+        LIFT.effect.enter(row, LIFT.place, np.array([1.0]))
+
+    searches = Searches(tmp_path, seconds=4.0, enter=pull)
+    bad, good = np.full(8, 10.0), np.linspace(1.0, 1.2, 8)
+    elbow, lift = (searches.tried(each, bad, good) for each in (ELBOW, LIFT))
+    found = searches.search(bad, lift, before=(elbow,))
+    train, test = found.problem.of("train"), found.problem.of("test")
+    found.current = polish(found.current.space, found.current.z, train, 4)
+    found.current_losses = stretches(found.problem, found.current.variant, test)
+    unsure = Judged(replace(elbow.gain, surely=-np.inf, apart=None), np.empty(0), None)
+    monkeypatch.setattr(fewer, "judged", lambda *rest: unsure)
+    monkeypatch.setattr(fewer, "_is_there", lambda *rest: True)
+    prune(found, train, test)
+    assert [each.candidate for each in found.accepted] == ([ELBOW, LIFT] if pulled else [LIFT])
 
 
 def test_a_cause_that_is_surely_there_only_by_all_recordings_together_stays(tmp_path: Path):
