@@ -123,7 +123,7 @@ def test_how_much_is_enough_depends_on_what_is_left_beyond_measured_noise(
     ("before", "gain", "is_enough"),
     [
         (1.05, 0.004, True),
-        (1.05, 0.0005, False),  # of no use to anybody
+        (1.05, 0.002, False),  # of no use to anybody
         (1.4, 0.05, False),  # the base is not quite right: it is sure, and may be the base's fault
         (1.4, 0.09, True),
     ],
