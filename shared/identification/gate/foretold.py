@@ -67,8 +67,8 @@ class Foretold:
 
     @property
     def is_seen(self) -> bool:
-        """Return whether they do more likely than not, by about as much as foretold."""
-        return self.errors >= _FOLLOWED and self.share >= _LEAST
+        """Return whether they could tell, and do more likely than not, by about as much."""
+        return self.is_told and self.errors >= _FOLLOWED and self.share >= _LEAST
 
 
 class Held:

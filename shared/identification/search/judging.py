@@ -102,7 +102,7 @@ def _apart(
     surer it is, the less sure the recordings need to be that were fitted to, and the other way
     round.
     """
-    if foretold is None or not (foretold.is_told and foretold.is_seen):
+    if foretold is None or not foretold.is_seen:
         return None
     fitted = sureness(after, candidate, found.problem.of("train"))
     if fitted + foretold.errors < SURELY:
