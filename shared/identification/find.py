@@ -15,13 +15,13 @@ from shared.identification.conclusion.gathered import evidence_of
 from shared.identification.dataset.caveats import in_words
 from shared.identification.dataset.types import Dataset, with_timestep
 from shared.identification.effect import Effect
-from shared.identification.fitting.problem import BLOCK, Variant
+from shared.identification.fitting.problem import BLOCK, Span, Variant
 from shared.identification.fitting.saved import load, save
 from shared.identification.fitting.timestep import coarse_step, shorter
 from shared.identification.fitting.whole import fit_to_all
 from shared.identification.leftover.located import leftovers
 from shared.identification.progress import Progress, silent
-from shared.identification.search.again import fresh, leave_out
+from shared.identification.search.again import fresh, leave_out, pushed_in
 from shared.identification.search.bare import counted_by_torque
 from shared.identification.search.begin import begin, begin_without, doubted_of
 from shared.identification.search.bent import far_from_file, is_worse, otherwise, worse_than_file
@@ -32,6 +32,7 @@ from shared.identification.search.searched import Search, is_open
 from shared.identification.verdict import Unexplained, Verdict
 from shared.runtime.build import commit
 from shared.runtime.service import version
+from shared.telemetry.wording import listing
 
 _LITTLE = 4.0
 """Mean square residual, in noise floors, up to which a time step may be all that is wrong."""
@@ -70,22 +71,33 @@ def identify(
     clock = _Stages()
     known = effects() if catalogue is None else tuple(catalogue)
 
-    def begun(of: Dataset, folder: Path | None) -> Search:
+    def begun(of: Dataset, folder: Path | None, aside: tuple[Span, ...] = ()) -> Search:
         fits = None if folder is None else load(folder, of, seed)
         begins = begin(
-            of, seed=seed, progress=progress, without=frozenset(without), catalogue=known, fits=fits
-        )
+            of, seed=seed, progress=progress, without=frozenset(without), catalogue=known,
+            fits=fits, aside=aside,
+        )  # fmt: skip
         if folder is not None:
             save(folder, of, seed, begins)
         clock.over("base fit")
         return begins
 
-    found = begun(dataset, resume_folder)
-    found, left = _searched(found, seed, progress, clock)
+    def folder_of(name: str) -> Path | None:
+        return None if resume_folder is None else resume_folder / name
+
+    found, left = _searched(begun(dataset, resume_folder), seed, progress, clock)
+    if is_open(found) and (aside := pushed_in(found, left)):
+        names = listing(sorted({each.trajectory for each in aside}))
+        progress("base fit", 0.0, f"again, without what was pushed in {names}")
+        pushes = [each for each in left if each.is_external]
+        other = begun(dataset, folder_of("without_pushes"), aside)
+        other, other_left = _searched(other, seed, progress, clock, pushes)
+        if other.plainly.least < found.plainly.least:
+            found, left = other, other_left
     if _may_be_its_step(found) and (step := shorter(found.base)) is not None:
         progress("base fit", 0.0, f"again, at a time step of {1e3 * step:g} ms")
-        again = None if resume_folder is None else resume_folder / "shorter_step"
-        other = begun(with_timestep(dataset, step), again)
+        aside = found.problem.aside
+        other = begun(with_timestep(dataset, step), folder_of("shorter_step"), aside)
         other, other_left = _searched(other, seed, progress, clock)
         if not is_open(other):
             found, left = other, other_left
@@ -103,7 +115,11 @@ def identify(
 
 
 def _searched(
-    found: Search, seed: int, progress: Progress, clock: "_Stages"
+    found: Search,
+    seed: int,
+    progress: Progress,
+    clock: "_Stages",
+    known: Sequence[Unexplained] = (),
 ) -> tuple[Search, tuple[Unexplained, ...]]:
     """Return a search that is over, and what is left after it.
 
@@ -112,12 +128,13 @@ def _searched(
         seed: of everything random.
         progress: is told how far it is.
         clock: is told what takes how long.
+        known: what came from outside, as an earlier search saw it.
     """
     untouched = fresh(found, seed)
     search(found, progress)
     clock.over("search")
     progress("unexplained", 0.0)
-    left = _left(found)
+    left = _left(found, known)
     clock.over("unexplained")
     if is_open(found) and leave_out(untouched, left):
         progress("screen", 0.0, "again, without held-out stretches in which something pushed")
@@ -140,7 +157,7 @@ def _searched(
             and not is_open(other)
             and not is_worse(other.current_losses, found.current_losses)
         ):
-            found, left = other, _left(other)
+            found, left = other, _left(other, known)
         clock.over("search")
     fit_to_all(found, left)
     clock.over("search")
@@ -170,8 +187,10 @@ def _pushed_once(found: Search, left: tuple[Unexplained, ...]) -> tuple[Unexplai
 
 
 def _left(found: Search, known: Sequence[Unexplained] = ()) -> tuple[Unexplained, ...]:
-    everything = (*found.problem.of("train"), *found.problem.of("test"))
-    return leftovers(found.problem, extended(found), everything, known)
+    problem = found.problem
+    asked = (*problem.of("train"), *problem.of("test"))
+    aside = tuple(index for index in range(len(problem.segments)) if index not in set(asked))
+    return leftovers(problem, extended(found), (*asked, *aside), known)
 
 
 def _evidence(found: Search) -> Evidence:

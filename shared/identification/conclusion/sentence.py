@@ -63,7 +63,10 @@ def sentence_of(
             f"but from {ratio} it leaves {held_out.extended:.2f}, {why}."
         )
     if left and all(each.is_external for each in left):
-        return f"Nothing to name but what came from outside.{_also_pushed(left)}"
+        if held_out.base_fit**2 <= NEARLY_NOISE:
+            return f"Nothing to name but what came from outside.{_also_pushed(left)}"
+        told = f"Something is wrong that no effect of the catalogue explains: {ratio}."
+        return f"{told}{_also_pushed(left)}"
     if left and held_out.base_fit**2 <= NEARLY_NOISE:
         first = left[0]
         return (

@@ -6,6 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,16 @@ class Variant:
         return Variant(self.x, (*kept, (candidate, values)))
 
 
+class Span(NamedTuple):
+    """Some of a recording."""
+
+    trajectory: str
+    begin: float
+    """(s)."""
+    end: float
+    """(s)."""
+
+
 @dataclass
 class Problem:
     """A data set, an arm, and what is fitted."""
@@ -61,6 +72,8 @@ class Problem:
     """Length of the parts that are replayed (s); None for as long as they come."""
     uncounted: dict[int, NDArray[np.bool_]] = field(default_factory=dict[int, NDArray[np.bool_]])
     """bool[B] by segment: blocks that no loss counts, since something outside acted there."""
+    aside: tuple[Span, ...] = ()
+    """What nothing is fitted to, since something outside acted there."""
     segments: tuple[Segment, ...] = field(init=False)
     _arms: dict[tuple[Structure, float], Rollouts] = field(
         default_factory=dict[tuple[Structure, float], Rollouts]
@@ -91,7 +104,7 @@ class Problem:
         """Return the same with recordings in parts that each start from the measured state."""
         return Problem(
             self.subject, self.dataset, self.parameters, self.noise, window,
-            _arms=self._arms,
+            aside=self.aside, _arms=self._arms,
         )  # fmt: skip
 
     def smooth(self) -> "Problem":
@@ -109,15 +122,27 @@ class Problem:
         """Return the same with more numbers in the base, after those that it has."""
         return Problem(
             self.subject, self.dataset, (*self.parameters, *more), self.noise, self.window,
-            self.uncounted, _arms=self._arms,
+            self.uncounted, self.aside, _arms=self._arms,
         )  # fmt: skip
 
     def of(self, split: str) -> tuple[int, ...]:
-        """Return the segments of the trajectories to fit to (``train``) or held out (``test``)."""
+        """Return the segments of the trajectories to fit to (``train``) or held out (``test``).
+
+        Without those to fit to that are set aside, if only in part.
+        """
         return tuple(
             index
             for index, segment in enumerate(self.segments)
             if self.dataset.trajectories[segment.trajectory].split == split
+            and not (split == "train" and self._is_aside(segment))
+        )
+
+    def _is_aside(self, segment: Segment) -> bool:
+        name = self.dataset.trajectories[segment.trajectory].name
+        begin = segment.recorded.begin
+        end = begin + float(segment.recorded.joints_at[-1])
+        return any(
+            each.trajectory == name and each.begin < end and begin < each.end for each in self.aside
         )
 
     def structure(self, variant: Variant) -> Structure:

@@ -38,7 +38,10 @@ def changed_by(fit: Fit, timestep: float) -> Float64:
     test = problem.of("test")
     plant = stepped(problem.subject.plant, timestep)
     subject = replace(problem.subject, plant=plant, nominal=Rollouts(plant, (), len(test)))
-    other = Problem(subject, problem.dataset, problem.parameters, problem.noise, problem.window)
+    other = Problem(
+        subject, problem.dataset, problem.parameters, problem.noise, problem.window,
+        aside=problem.aside,
+    )  # fmt: skip
     joints = len(subject.joints)
     before, after = (each.plain(variant, test) for each in (problem, other))
     changed = [one[:, :joints] - two[:, :joints] for one, two in zip(before, after, strict=True)]

@@ -1,15 +1,20 @@
-"""A second search, where something outside pushed the arm in what was held out."""
+"""A second search, where something outside pushed the arm: without what it did."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from shared.identification.fitting.problem import Problem, Span
 from shared.identification.gate.held_out import FEWEST, stretches
 from shared.identification.leftover.pushes import not_counted
+from shared.identification.search.once import is_named
 from shared.identification.search.screen import Seen
 from shared.identification.search.searched import Search
 from shared.identification.verdict import Unexplained
+
+_KEPT = 0.5
+"""Share of what was fitted to that has to be left without what was pushed."""
 
 
 def fresh(found: Search, seed: int) -> Search:
@@ -49,3 +54,34 @@ def leave_out(found: Search, left: Sequence[Unexplained]) -> bool:
     found.base_losses = losses
     found.current_losses = stretches(problem, found.current.variant, test)
     return True
+
+
+def pushed_in(found: Search, left: Sequence[Unexplained]) -> tuple[Span, ...]:
+    """Return what something outside pushed of what was fitted to, to be fitted to no more.
+
+    A push at the hand is one at many joints. If it was not named, the base has been bent to make
+    up for it, and nothing else can be seen beside that.
+
+    Args:
+        found: the search, over.
+        left: what its model does not explain.
+
+    Returns:
+        None if there is none, or if too little would be left to fit to.
+    """
+    spans = tuple(
+        Span(each.trajectory, each.begin, each.end)
+        for each in left
+        if each.is_external and not is_named(found, each)
+    )
+    problem = found.problem
+    without = replace(problem, aside=(*problem.aside, *spans))
+    kept, all_of_it = _seconds(without), _seconds(problem)
+    return without.aside if _KEPT * all_of_it <= kept < all_of_it else ()
+
+
+def _seconds(problem: Problem) -> float:
+    """Return how long all that is fitted to is (s)."""
+    return sum(
+        float(problem.segments[index].recorded.joints_at[-1]) for index in problem.of("train")
+    )

@@ -19,7 +19,7 @@ from shared.identification.fitting.base import (
 from shared.identification.fitting.creep import creep_of, with_creep
 from shared.identification.fitting.fit import Fit
 from shared.identification.fitting.parameters import BaseParameter, base_parameters, bends
-from shared.identification.fitting.problem import BLOCK, Problem
+from shared.identification.fitting.problem import BLOCK, Problem, Span
 from shared.identification.fitting.space import Space
 from shared.identification.gate.held_out import stretches
 from shared.identification.noise.floor import noise_of
@@ -49,6 +49,7 @@ def begin(
     without: frozenset[str],
     catalogue: Sequence[Effect],
     fits: SavedFits | None = None,
+    aside: tuple[Span, ...] = (),
 ) -> Search:
     """Return a search with its base fitted.
 
@@ -59,6 +60,7 @@ def begin(
         without: effects to leave out, by name.
         catalogue: what is looked for.
         fits: the base's fit, if it was found before.
+        aside: what nothing is fitted to; what happened once in such a recording is not looked for.
 
     Raises:
         IdentificationError: the model does not fit the recordings.
@@ -72,7 +74,9 @@ def begin(
     if fits is not None and not {each.name for each in (*known, *creep)} >= set(fits.names):
         fits = None
     candidates, ruled_out = candidates_of(catalogue, subject, without)
-    full = Problem(subject, dataset, released, noise)
+    pushed = {each.trajectory for each in aside}
+    candidates = tuple(each for each in candidates if each.recording not in pushed)
+    full = Problem(subject, dataset, released, noise, aside=aside)
     lacks = lacking(Space(full), candidates)
     if not noise.is_measured:
         progress("noise floor", 0.5, "no repeats: from what the base leaves")
@@ -90,8 +94,8 @@ def begin(
     is_new = fits is None and family is None and lacks and not noise.is_measured
     if done is None or is_new:
         progress("base fit", 0.5, "as an arm that torques push which nobody knows")
-        pushed = replace(problem, noise=astray(Space(full, lacks)))
-        other, found = step.from_base(pushed, rng)
+        by_torque = replace(problem, noise=astray(Space(full, lacks)))
+        other, found = step.from_base(by_torque, rng)
         done, family = (done, family) if done and found is None else (other, found)
     problem = done.whole.space.problem
     return begun_with(

@@ -92,6 +92,9 @@ def test_a_push_beside_a_cause_is_told_with_it(searches: Searches):
     assert alone.word == "unexplained"
     assert "Nothing to name but what came from outside" in alone.sentence
     assert "2 times" in alone.sentence
+    more = conclude(searches.search(_BAD), (push,))
+    assert more.sentence.startswith("Something is wrong that no effect")
+    assert "pushed elbow once" in more.sentence
 
 
 def test_a_floor_that_nothing_measured_is_not_called_the_noise(searches: Searches):
