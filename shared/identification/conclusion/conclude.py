@@ -10,7 +10,7 @@ from shared.identification.dataset.types import Float64
 from shared.identification.fitting.problem import Variant
 from shared.identification.gate.certainty import half_widths, is_there
 from shared.identification.gate.held_out import compare, floor_of
-from shared.identification.search.bent import ties_with_base
+from shared.identification.search.bent import far_from_file, ties_with_base
 from shared.identification.search.searched import ALIKE, Search, Tried, is_open, plain_losses
 from shared.identification.verdict import (
     BaseValue,
@@ -56,7 +56,9 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
     told = accepted if word == "unexplained" else sure
     return Conclusion(
         word=word,
-        sentence=sentence_of(word, told, ties, held_out, left, found.is_only_like),
+        sentence=sentence_of(
+            word, told, ties, held_out, left, found.is_only_like, far_from_file(found.current)
+        ),
         causes=sure if word in ("named", "tie") else (),
         ties=ties if word == "tie" else (),
         held_out=held_out,

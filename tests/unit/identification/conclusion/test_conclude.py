@@ -58,6 +58,21 @@ def test_a_base_at_the_noise_has_nothing_to_name(searches: Searches):
     assert found.held_out.share_removed == 0.0
 
 
+def test_where_nothing_is_named_the_sentence_says_what_the_base_is_far_from(searches: Searches):
+    index = [each.name for each in searches.problem.parameters].index("kp elbow")
+    z = searches.base.z.copy()
+    z[index] = np.log(3.0)
+    bent = dataclasses.replace(searches.base, z=z)
+    said = "The base is far from the model file: kp elbow 3 times what it says."
+    none = conclude(dataclasses.replace(searches.search(_GOOD), current=bent), ())
+    assert none.word == "none"
+    assert none.sentence.endswith(said)
+    open_ = conclude(dataclasses.replace(searches.search(_BAD), current=bent), ())
+    assert open_.word == "unexplained"
+    assert open_.sentence.endswith(said)
+    assert said not in conclude(searches.search(_GOOD), ()).sentence
+
+
 def test_a_base_that_went_far_is_a_tie_with_what_does_as_well(searches: Searches):
     tried = searches.tried(ELBOW, _GOOD, _GOOD)
     parameters = searches.problem.parameters
