@@ -24,7 +24,7 @@ from shared.identification.progress import Progress, silent
 from shared.identification.search.again import fresh, leave_out, pushed_in
 from shared.identification.search.bare import counted_by_torque
 from shared.identification.search.begin import begin, begin_without, doubted_of
-from shared.identification.search.bent import far_from_file, is_worse, otherwise, worse_than_file
+from shared.identification.search.bent import is_worse, otherwise, worse_than_file
 from shared.identification.search.likeness import is_only_like
 from shared.identification.search.once import is_named, take_back_pushes, take_pushes
 from shared.identification.search.rounds import search
@@ -89,9 +89,8 @@ def identify(
     if is_open(found) and (aside := pushed_in(found, left)):
         names = listing(sorted({each.trajectory for each in aside}))
         progress("base fit", 0.0, f"again, without what was pushed in {names}")
-        pushes = [each for each in left if each.is_external]
         other = begun(dataset, folder_of("without_pushes"), aside)
-        other, other_left = _searched(other, seed, progress, clock, pushes)
+        other, other_left = _searched(other, seed, progress, clock, _pushes(left))
         if other.plainly.least < found.plainly.least:
             found, left = other, other_left
     if _may_be_its_step(found) and (step := shorter(found.base)) is not None:
@@ -141,7 +140,7 @@ def _searched(
         found = untouched
         search(found, progress)
         clock.over("search")
-        left = _left(found, [each for each in left if each.is_external])
+        left = _left(found, _pushes(left))
         clock.over("unexplained")
     left = _pushed_once(found, left)
     clock.over("unexplained")
@@ -178,10 +177,10 @@ def _pushed_once(found: Search, left: tuple[Unexplained, ...]) -> tuple[Unexplai
     if found.problem.noise.is_torque:
         return left  # all that is left is taken for torques that nobody knows
     if take_back_pushes(found, left):
-        left = _left(found, [each for each in left if each.is_external])
+        left = _left(found, _pushes(left))
     if is_open(found) or not take_pushes(found, left):
         return left
-    known = [each for each in left if each.is_external and not is_named(found, each)]
+    known = [each for each in _pushes(left) if not is_named(found, each)]
     left = _left(found, known)
     return _left(found, known) if take_back_pushes(found, left) else left
 
@@ -189,8 +188,13 @@ def _pushed_once(found: Search, left: tuple[Unexplained, ...]) -> tuple[Unexplai
 def _left(found: Search, known: Sequence[Unexplained] = ()) -> tuple[Unexplained, ...]:
     problem = found.problem
     asked = (*problem.of("train"), *problem.of("test"))
-    aside = tuple(index for index in range(len(problem.segments)) if index not in set(asked))
+    aside = sorted(set(range(len(problem.segments))) - set(asked))
     return leftovers(problem, extended(found), (*asked, *aside), known)
+
+
+def _pushes(left: Sequence[Unexplained]) -> list[Unexplained]:
+    """Return what came from outside, of what is left."""
+    return [each for each in left if each.is_external]
 
 
 def _evidence(found: Search) -> Evidence:
@@ -225,7 +229,7 @@ def _verdict(
                 None,
                 [
                     worse_than_file(found),
-                    far_from_file(found.current),
+                    conclusion.far,
                     _shorter_step(found, dataset),
                     coarse_step(found.base),
                     counted_by_torque(found.problem.noise),

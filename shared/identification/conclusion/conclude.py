@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shared.identification.conclusion.causes import causes_of, ties_of
-from shared.identification.conclusion.sentence import sentence_of
+from shared.identification.conclusion.sentence import sentence_of, with_far
 from shared.identification.dataset.types import Float64
 from shared.identification.fitting.problem import Variant
 from shared.identification.gate.certainty import half_widths, is_there
@@ -38,6 +38,8 @@ class Conclusion:
     held_out: HeldOut
     candidates: tuple[Scored, ...]
     base: tuple[BaseValue, ...]
+    far: str
+    """What of the base is surely far from the model file, in words; empty if nothing."""
 
 
 def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
@@ -54,16 +56,17 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
     word = _word(found, ties, left)
     sure = tuple(cause for cause, rivals in zip(accepted, found.rivals, strict=True) if not rivals)
     told = accepted if word == "unexplained" else sure
+    sentence = sentence_of(word, told, ties, held_out, left, found.is_only_like)
+    far = far_from_file(found.current)
     return Conclusion(
         word=word,
-        sentence=sentence_of(
-            word, told, ties, held_out, left, found.is_only_like, far_from_file(found.current)
-        ),
+        sentence=with_far(sentence, word, far),
         causes=sure if word in ("named", "tie") else (),
         ties=ties if word == "tie" else (),
         held_out=held_out,
         candidates=_scored(found, word),
         base=_base(found, widths),
+        far=far,
     )
 
 

@@ -19,7 +19,6 @@ def sentence_of(
     held_out: HeldOut,
     left: tuple[Unexplained, ...],
     is_only_like: bool = False,
-    far: str = "",
 ) -> str:
     """Return the verdict for people.
 
@@ -30,23 +29,7 @@ def sentence_of(
         held_out: how much is left.
         left: where.
         is_only_like: whether the causes stand in for a law that is not known.
-        far: which numbers of the model file the base fit is surely far from, in words. Where
-            nothing is named, these are what is wrong, as far as is known.
     """
-    told = _told(word, causes, ties, held_out, left, is_only_like)
-    if not far or word not in ("none", "unexplained"):
-        return told
-    return f"{told} {far[0].upper()}{far[1:]}."
-
-
-def _told(
-    word: Word,
-    causes: tuple[Cause, ...],
-    ties: tuple[Tie, ...],
-    held_out: HeldOut,
-    left: tuple[Unexplained, ...],
-    is_only_like: bool,
-) -> str:
     floor = "the noise" if held_out.is_floor_measured else "what the base fit usually leaves"
     ratio = f"{held_out.base_fit:.2f} times {floor}"
     if word == "named":
@@ -93,6 +76,21 @@ def _told(
         )
     place = f", most of it at {left[0].where} {left[0].phase}" if left else ""
     return f"Something is wrong that no effect of the catalogue explains: {ratio}{place}."
+
+
+def with_far(sentence: str, word: Word, far: str) -> str:
+    """Return a verdict for people with what the base is far from, where nothing is named.
+
+    That is what is wrong then, as far as is known.
+
+    Args:
+        sentence: the verdict.
+        word: the same, in one.
+        far: which numbers of the model file the base fit is surely far from, or nothing.
+    """
+    if not far or word not in ("none", "unexplained"):
+        return sentence
+    return f"{sentence} {far[0].upper()}{far[1:]}."
 
 
 def _by_all(held_out: HeldOut) -> str:

@@ -67,7 +67,7 @@ def pushed_in(found: Search, left: Sequence[Unexplained]) -> tuple[Span, ...]:
         left: what its model does not explain.
 
     Returns:
-        None if there is none, or if too little would be left to fit to.
+        Nothing where nothing was pushed, or too little would be left to fit to.
     """
     spans = tuple(
         Span(each.trajectory, each.begin, each.end)
