@@ -1,4 +1,4 @@
-"""How fast an arm is at its first reading, where no velocity was logged."""
+"""How fast an arm is at its first reading."""
 
 from typing import Final
 
@@ -14,6 +14,10 @@ SURE: Final = 5.0
 """Standard errors that it must be from nothing to be believed."""
 _FEWEST = 5
 """Readings."""
+_FITS = 1.5
+"""Mean square, in noises, up to which a cubic fits readings."""
+_THERE = 3.0
+"""Standard errors from which a logged velocity is not noise."""
 _APART = 0.5
 """Of a velocity, that two ways to tell it may differ by."""
 
@@ -45,6 +49,59 @@ def surely_moving(at: Float64, q: Float64) -> Float64:
     is_steady = np.abs(line - velocity) < _APART * np.abs(velocity)
     is_sure = np.abs(velocity) > np.maximum(LEAST, SURE * error)
     return np.where(is_steady & is_sure, velocity, 0.0)
+
+
+def logged_velocities(at: Float64, q: Float64, qd: Float64) -> Float64:
+    """Return joints' velocities at the first reading where velocities were logged, float64[J].
+
+    One reading has all of its noise, as if an arm at rest set off by it. So they are those of
+    cubics through the first positions and velocities together, each by its noise, or 0 where they
+    may as well be; and the first reading where no cubic fits those after it, however few.
+
+    Args:
+        at: float64[T], times (s).
+        q: float64[T, J].
+        qd: float64[T, J].
+    """
+    noises = _noise(q), _noise(qd)
+    joints = zip(q.T, qd.T, *noises, strict=True)
+    return np.array([_logged(at - at[0], *each) for each in joints], np.float64)
+
+
+def _noise(readings: Float64) -> Float64:
+    """Return the standard deviation of each column's noise by differences of four readings.
+
+    What is smooth takes no part in these, so that it is rather said too large than too small.
+    """
+    if len(readings) < _FEWEST:
+        return np.zeros_like(readings[0])
+    third: Float64 = np.diff(readings, 3, axis=0)
+    return np.sqrt(np.mean(np.square(third), axis=0) / 20.0)
+
+
+def _logged(since: Float64, q: Float64, qd: Float64, of_q: float, of_qd: float) -> float:
+    """Return one joint's; noises are those of its positions and of its velocities."""
+    count = int(np.sum(since <= WINDOW)) if of_q > 0.0 and of_qd > 0.0 else 0
+    while count >= _FEWEST:
+        at = since[:count]
+        still, one = np.zeros(count), np.ones(count)
+        powers = np.r_[
+            np.stack([one, at, at**2, at**3], axis=1) / of_q,
+            np.stack([still, one, 2.0 * at, 3.0 * at**2], axis=1) / of_qd,
+        ]
+        wanted = np.r_[q[:count] / of_q, qd[:count] / of_qd]
+        inverse = np.asarray(np.linalg.pinv(powers), np.float64)
+        found = inverse @ wanted
+        left = wanted - powers @ found
+        if float(left @ left) < _FITS * (len(left) - 4):
+            return _there(float(found[1]), float(np.linalg.norm(inverse[1])))
+        count //= 2
+    return _there(float(qd[0]), of_qd)
+
+
+def _there(velocity: float, error: float) -> float:
+    """Return a velocity, or 0 if it may as well be its error."""
+    return velocity if abs(velocity) > _THERE * error else 0.0
 
 
 def _slopes(since: Float64, q: Float64, degree: int) -> tuple[Float64, Float64]:

@@ -9,7 +9,7 @@ import numpy as np
 from shared.config.site import nearest
 from shared.errors import IdentificationError
 from shared.identification.dataset import caveats, checks
-from shared.identification.dataset.beginnings import surely_moving
+from shared.identification.dataset.beginnings import logged_velocities, surely_moving
 from shared.identification.dataset.manifest import (
     FILE,
     Manifest,
@@ -134,7 +134,7 @@ def _trajectory(
         sent = np.stack([command.columns[each] for each in actuators], axis=1)
         if manifest.control == "position":
             _check_units(recording, joints, q)
-    speed = surely_moving(times, q) if qd is None else qd[0]
+    speed = surely_moving(times, q) if qd is None else logged_velocities(times, q, qd)
     made = Trajectory(
         name, entry.split, entry.repeats,
         _initial(path, entry, "initial", joints, q[0], manifest.model),

@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from shared.identification.dataset.beginnings import first_velocities, surely_moving
+from shared.identification.dataset.beginnings import (
+    first_velocities,
+    logged_velocities,
+    surely_moving,
+)
+from shared.identification.dataset.types import Float64
 
 _AT = np.arange(100) / 100.0
 
@@ -32,3 +37,37 @@ def test_an_arm_that_sets_off_late_starts_at_rest():
 def test_of_three_readings_nothing_is_sure():
     at = _AT[:3]
     assert not surely_moving(at, np.stack([at, 3.0 * at], axis=1)).any()
+
+
+def logged(rng: np.random.Generator, q: Float64, qd: Float64) -> float:
+    """Return a joint's first velocity from readings every 4 ms, those of speed worse by far."""
+    at = np.arange(len(q)) / 250.0
+    noise = rng.standard_normal((2, len(q)))
+    found = logged_velocities(at, (q + 6e-5 * noise[0])[:, None], (qd + 6e-3 * noise[1])[:, None])
+    return float(found[0])
+
+
+def test_an_arm_that_rests_does_not_set_off_by_one_noisy_speed():
+    rng, still = np.random.default_rng(2), np.zeros(500)
+    found = np.array([logged(rng, still, still) for _ in range(300)])
+    assert np.mean(found != 0.0) < 0.02
+    assert np.abs(found).max() < 6e-3
+
+
+def test_a_logged_start_in_motion_is_known_better_than_by_one_reading():
+    rng, at = np.random.default_rng(3), np.arange(500) / 250.0
+    q, qd = 0.3 * np.sin(2.0 * at), 0.6 * np.cos(2.0 * at)
+    off = np.array([logged(rng, q, qd) for _ in range(100)]) - 0.6
+    assert np.sqrt(np.mean(off**2)) < 3e-3
+
+
+def test_where_no_cubic_fits_the_first_logged_velocity_is_taken_as_it_is():
+    at = np.arange(500) / 250.0
+    qd = np.where(at < 0.008, 0.5, -0.5) + 1e-3 * np.sin(9.0 * at)
+    q = np.cumsum(qd) / 250.0
+    assert logged_velocities(at, q[:, None], qd[:, None])[0] == qd[0]
+
+
+def test_without_noise_the_first_logged_velocity_is_taken_as_it_is():
+    still = np.zeros((300, 1))
+    assert logged_velocities(np.arange(300) / 100.0, still, still + 0.2)[0] == 0.2
