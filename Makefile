@@ -85,6 +85,7 @@ soak: $(STAMP) ## training and play together for SOAK_MINUTES (120): does anythi
 docs: $(STAMP) ## renew the generated parts of docs/ and deploy/
 	@$(BIN)/python -m shared.messages.table --write docs/architecture.md
 	@$(BIN)/python -m shared.telemetry.columns docs/recordings.md
+	@$(BIN)/python -m shared.identification.hidden.catalogue_page docs/effects.md
 	@$(BIN)/python -m benchmarks.identification.summary docs/identify_results.md
 	@$(BIN)/python -m services.router deploy/zenoh/site.toml --print-config > deploy/zenoh/zenohd.json5.new && mv deploy/zenoh/zenohd.json5.new deploy/zenoh/zenohd.json5
 	@$(BIN)/python -m services.jobs.site > deploy/local.toml.new && mv deploy/local.toml.new deploy/local.toml

@@ -26,6 +26,7 @@ from shared.identification.search.bare import counted_by_torque
 from shared.identification.search.begin import begin, begin_without, doubted_of
 from shared.identification.search.bent import is_worse, otherwise, worse_than_file
 from shared.identification.search.likeness import is_only_like
+from shared.identification.search.misstated import misstated
 from shared.identification.search.once import is_named, take_back_pushes, take_pushes
 from shared.identification.search.rounds import search
 from shared.identification.search.searched import Search, is_open
@@ -70,6 +71,7 @@ def identify(
     """
     clock = _Stages()
     known = effects() if catalogue is None else tuple(catalogue)
+    run = _Run(seed, progress, clock, tuple(each for each in known if each.name not in without))
 
     def begun(of: Dataset, folder: Path | None, aside: tuple[Span, ...] = ()) -> Search:
         fits = None if folder is None else load(folder, of, seed)
@@ -85,19 +87,19 @@ def identify(
     def folder_of(name: str) -> Path | None:
         return None if resume_folder is None else resume_folder / name
 
-    found, left = _searched(begun(dataset, resume_folder), seed, progress, clock)
+    found, left = _searched(begun(dataset, resume_folder), run)
     if is_open(found) and (aside := pushed_in(found, left)):
         names = listing(sorted({each.trajectory for each in aside}))
         progress("base fit", 0.0, f"again, without what was pushed in {names}")
         other = begun(dataset, folder_of("without_pushes"), aside)
-        other, other_left = _searched(other, seed, progress, clock, _pushes(left))
+        other, other_left = _searched(other, run, _pushes(left))
         if other.plainly.least < found.plainly.least:
             found, left = other, other_left
     if _may_be_its_step(found) and (step := shorter(found.base)) is not None:
         progress("base fit", 0.0, f"again, at a time step of {1e3 * step:g} ms")
         aside = found.problem.aside
         other = begun(with_timestep(dataset, step), folder_of("shorter_step"), aside)
-        other, other_left = _searched(other, seed, progress, clock)
+        other, other_left = _searched(other, run)
         if not is_open(other):
             found, left = other, other_left
     if not is_open(found):
@@ -113,22 +115,42 @@ def identify(
     return Finding(_verdict(found, conclusion, left, dataset, seed, clock.seconds), evidence)
 
 
+class _Stages:
+    """CPU seconds by stage."""
+
+    def __init__(self) -> None:
+        self._last = time.process_time()
+        self.seconds: dict[str, float] = {}
+
+    def over(self, stage: str) -> None:
+        """Take note that a stage is over."""
+        now = time.process_time()
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self._last
+        self._last = now
+
+
+@dataclass(frozen=True)
+class _Run:
+    """What is the same for every search of a data set."""
+
+    seed: int
+    progress: Progress
+    clock: _Stages
+    effects: tuple[Effect, ...]
+    """What may be named."""
+
+
 def _searched(
-    found: Search,
-    seed: int,
-    progress: Progress,
-    clock: "_Stages",
-    known: Sequence[Unexplained] = (),
+    found: Search, run: _Run, known: Sequence[Unexplained] = ()
 ) -> tuple[Search, tuple[Unexplained, ...]]:
     """Return a search that is over, and what is left after it.
 
     Args:
         found: as it begins.
-        seed: of everything random.
-        progress: is told how far it is.
-        clock: is told what takes how long.
+        run: of which it is.
         known: what came from outside, as an earlier search saw it.
     """
+    seed, progress, clock = run.seed, run.progress, run.clock
     untouched = fresh(found, seed)
     search(found, progress)
     clock.over("search")
@@ -158,6 +180,8 @@ def _searched(
         ):
             found, left = other, _left(other, known)
         clock.over("search")
+    if other := misstated(found, untouched, run.effects, seed, progress):
+        found, left = other, _left(other, _pushes(left))
     fit_to_all(found, left)
     clock.over("search")
     return found, left
@@ -286,17 +310,3 @@ def _record_next(conclusion: Conclusion, dataset: Dataset) -> tuple[str, ...]:
     if conclusion.word in ("unexplained", "base_too_coarse"):
         out.append("Record the whole programme of `riposte identify excite`, joint by joint.")
     return tuple(out)
-
-
-class _Stages:
-    """CPU seconds by stage."""
-
-    def __init__(self) -> None:
-        self._last = time.process_time()
-        self.seconds: dict[str, float] = {}
-
-    def over(self, stage: str) -> None:
-        """Take note that a stage is over."""
-        now = time.process_time()
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self._last
-        self._last = now

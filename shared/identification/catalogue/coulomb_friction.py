@@ -10,24 +10,29 @@ from shared.sim.plant.structure import Structure
 
 
 class CoulombFriction:
-    """Dry friction of a joint whose model has none; where there is some, the base fit has it."""
+    """Dry friction of a joint, beyond what its model file has."""
 
     name = "coulomb_friction"
-    title = "the joint has dry friction"
+    title = "the joint's dry friction is not what the model file says"
     signature = "A step at each reversal, the same at any speed; the joint sticks when it stands."
     side: Side = "plant"
 
     def places(self, subject: Subject) -> tuple[str, ...]:
-        """Return the joints that move and have no friction; a PR2's are fitted in any case."""
+        """Return the joints that move and have no friction; the base fit has it elsewhere.
+
+        A PR2's are fitted in any case.
+        """
         if subject.control == "pose":
             return ()
         known = subject.nominal.model.dof_frictionloss
         return tuple(place.label for place in moving(subject) if known[place.dof] == 0.0)
 
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
-        """Return the level."""
+        """Return the torque: ``level``, or ``difference`` where the file has some."""
         joint = place_of(subject, place)
-        return (Quantity("level", joint.torque, 0.0, 2.0 * joint.drive, probe=0.1 * joint.drive),)
+        known = float(subject.nominal.model.dof_frictionloss[joint.dof])
+        name = "difference" if known else "level"
+        return (Quantity(name, joint.torque, -known, 2.0 * joint.drive, probe=0.1 * joint.drive),)
 
     def structure(self, subject: Subject, place: str) -> Structure:
         """Return nothing: every joint may rub."""

@@ -21,7 +21,7 @@ class NonlinearViscous:
         return tuple(place.label for place in moving(subject))
 
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
-        """Return b; at its least the nominal damping is used up at the joint's top speed."""
+        """Return ``b``; at its least the nominal damping is used up at the joint's top speed."""
         joint = place_of(subject, place)
         full = joint.drive / joint.speed**2
         damping = float(subject.nominal.model.dof_damping[joint.dof])

@@ -45,7 +45,7 @@ class StribeckFriction:
         return tuple(place.label for place in moving(subject))
 
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
-        """Return how much more it sticks, and up to about which speed."""
+        """Return how much more it sticks than it slides, and up to about which speed."""
         joint = place_of(subject, place)
         return (
             Quantity("excess", joint.torque, 0.0, 2.0 * joint.drive, probe=0.1 * joint.drive),

@@ -25,7 +25,7 @@ class TorqueBias:
         return tuple(place.label for place in moving(subject))
 
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
-        """Return the torque."""
+        """Return the torque; a positive one pushes towards positive angles."""
         joint = place_of(subject, place)
         most = 2.0 * joint.drive
         return (Quantity("torque", joint.torque, -most, most, probe=0.1 * joint.drive),)

@@ -10,7 +10,8 @@ from shared.identification.dataset.types import Float64
 from shared.identification.fitting.problem import Variant
 from shared.identification.gate.certainty import half_widths, is_there
 from shared.identification.gate.held_out import compare, floor_of
-from shared.identification.search.bent import far_from_file, ties_with_base
+from shared.identification.search.bent import ties_with_base
+from shared.identification.search.far import far_from_file
 from shared.identification.search.searched import ALIKE, Search, Tried, is_open, plain_losses
 from shared.identification.verdict import (
     BaseValue,
@@ -57,7 +58,7 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
     sure = tuple(cause for cause, rivals in zip(accepted, found.rivals, strict=True) if not rivals)
     told = accepted if word == "unexplained" else sure
     sentence = sentence_of(word, told, ties, held_out, left, found.is_only_like)
-    far = far_from_file(found.current)
+    far = far_from_file(found)
     return Conclusion(
         word=word,
         sentence=with_far(sentence, word, far),

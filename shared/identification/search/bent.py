@@ -18,12 +18,13 @@ from shared.identification.conclusion.sentence import label
 from shared.identification.dataset.types import Float64
 from shared.identification.fitting.base import WINDOW
 from shared.identification.fitting.fit import Fit, go_down, polish
-from shared.identification.fitting.parameters import INERTIA_PRIOR, BaseParameter, base_parameters
+from shared.identification.fitting.parameters import BaseParameter, base_parameters
 from shared.identification.fitting.problem import Problem
 from shared.identification.fitting.space import Space
 from shared.identification.gate.certainty import half_widths, is_there
 from shared.identification.gate.held_out import compare, stretches
 from shared.identification.progress import Progress
+from shared.identification.search.far import factor_of, far_of, is_of_file, surely_far, unit_of
 from shared.identification.search.screen import Screened, screen
 from shared.identification.search.searched import (
     ALIKE,
@@ -34,11 +35,7 @@ from shared.identification.search.searched import (
     Tried,
 )
 from shared.identification.verdict import Cause, Interval, Tie
-from shared.telemetry.wording import listing
 
-FAR = 0.5
-"""Of the logarithm of a gain, damping or armature, a factor of 1.65 either way; of the friction
-that a model file gives, as a share of it."""
 NEARBY = 0.2
 """Standard deviation of the same, in a model file that is about right."""
 _NEARER = 1.0
@@ -51,8 +48,6 @@ _MOST = 0.5
 """Of what the best of them explains: what explains less gets none."""
 _STEPS, _ENOUGH = 12, 1e-4
 """Of a fit: what pulls a base back is a small part of the cost."""
-_TOLD = 5
-"""Parameters that are told as far from the model file."""
 _SPOILED = 1.2
 """Times what the model file leaves, that a fit which carries over never does."""
 _SLIGHT = 15.0
@@ -70,7 +65,7 @@ def otherwise(found: Search, progress: Progress) -> Otherwise | None:
         found: a search in which the base alone explains the recordings.
         progress: is told how far it is.
     """
-    if not _far(found.base):
+    if not far_of(found.base):
         return None
     progress("base fit", 0.0, "again, near the model file")
     problem = replace(found.problem, parameters=_known(found.problem))
@@ -126,7 +121,10 @@ def _begun(placed: Fit, train: tuple[int, ...]) -> Fit:
     """
     space = placed.space
     most = np.array(
-        [_NEARER * _unit(each) if _is_file(each) else np.inf for each in space.problem.parameters]
+        [
+            _NEARER * unit_of(each) if is_of_file(each) else np.inf
+            for each in space.problem.parameters
+        ]
     )
     z = np.clip(placed.z, -most, most)
     if np.array_equal(z, placed.z):
@@ -138,7 +136,7 @@ def _begun(placed: Fit, train: tuple[int, ...]) -> Fit:
 def _is_far(base: Fit) -> bool:
     """Return whether a base is far from the model file, by one number surely or by all of them."""
     is_off = _stays(base.space.problem) and _against(base) > _SLIGHT
-    return is_off or bool(_surely_far(base))
+    return is_off or bool(surely_far(base))
 
 
 def _stays(problem: Problem) -> bool:
@@ -165,7 +163,7 @@ def _against(base: Fit) -> float:
 def _brings_back(base: Fit, fit: Fit) -> bool:
     """Return whether less is far from the model file in a fit, and that says something."""
     is_plain = base.cost - fit.cost > _plainly(fit.space.size - base.space.size)
-    return is_plain and set(_far(fit)) < set(_far(base))
+    return is_plain and set(far_of(fit)) < set(far_of(base))
 
 
 def _plainly(numbers: int) -> float:
@@ -205,32 +203,13 @@ def ties_with_base(found: Search) -> tuple[Tie, ...]:
     return (Tie(causes=causes, alike=other.alike, record=record),)
 
 
-def _far(fit: Fit) -> tuple[int, ...]:
-    """Return the coordinates of the base that are further from the model file than is likely."""
-    return tuple(
-        index
-        for index, (each, z) in enumerate(zip(fit.space.problem.parameters, fit.z, strict=False))
-        if _is_file(each) and abs(z) > FAR * _unit(each)
-    )
-
-
-def _is_file(each: BaseParameter) -> bool:
-    """Return whether the model file says how large a number is, and may be far off."""
-    return bool(each.nominal) and each.prior != INERTIA_PRIOR
-
-
-def _unit(each: BaseParameter) -> float:
-    """Return by how much a coordinate moves when its value does so by the nominal one."""
-    return 1.0 if each.is_factor else each.nominal / each.scale
-
-
 def _known(problem: Problem) -> tuple[BaseParameter, ...]:
     """Return all of the base's parameters as what a model file that is about right says of them.
 
     A friction of which it says nothing may be any; links are as well known as ever.
     """
     return tuple(
-        replace(each, prior=NEARBY * _unit(each)) if _is_file(each) else each
+        replace(each, prior=NEARBY * unit_of(each)) if is_of_file(each) else each
         for each in base_parameters(problem.subject)
     )
 
@@ -246,27 +225,6 @@ def _placed(fit: Fit, space: Space) -> Fit:
     rows = len(fit.residual) - space.size
     residual = np.r_[fit.residual[:rows], z / space.priors]
     return Fit.of(space, z, residual, np.r_[fit.jacobian[:rows], np.diag(1.0 / space.priors)])
-
-
-def _surely_far(fit: Fit) -> list[int]:
-    """Return what is far within the whole 95 % interval of a fit to recordings, furthest first."""
-    parameters = fit.space.problem.parameters
-    widths = half_widths(fit, fit.space.problem.of("train"))
-    nearest = {
-        index: (abs(float(fit.z[index])) - float(widths[index])) / _unit(parameters[index])
-        for index in _far(fit)
-    }
-    return sorted((one for one in nearest if nearest[one] > FAR), key=lambda one: -nearest[one])
-
-
-def far_from_file(fit: Fit) -> str:
-    """Return in words what of a fit's base is surely far from the model file; empty if nothing."""
-    parameters = fit.space.problem.parameters
-    said = [
-        f"{parameters[index].name} {_factor(parameters[index], float(fit.z[index])):.2g} times"
-        for index in _surely_far(fit)[:_TOLD]
-    ]
-    return f"the base is far from the model file: {listing(said)} what it says" if said else ""
 
 
 def worse_than_file(found: Search) -> str:
@@ -289,12 +247,12 @@ def _base_cause(other: Otherwise) -> Cause:
     """Return what the base does instead of a cause: the parameter that is furthest off for it."""
     base = other.base
     parameters, z = base.space.problem.parameters, base.z
-    back = set(_far(base)) - set(_far(other.tried[0].fit))
+    back = set(far_of(base)) - set(far_of(other.tried[0].fit))
     first, *others = sorted(
-        back, key=lambda index: -abs(float(z[index])) / _unit(parameters[index])
+        back, key=lambda index: -abs(float(z[index])) / unit_of(parameters[index])
     )
     each, half = parameters[first], half_widths(base, base.space.problem.of("train"))[first]
-    low, value, high = (_factor(each, float(z[first] + off)) for off in (-half, 0.0, half))
+    low, value, high = (factor_of(each, float(z[first] + off)) for off in (-half, 0.0, half))
     word, _, place = each.name.partition(" ")
     return Cause(
         effect="base model",
@@ -306,11 +264,7 @@ def _base_cause(other: Otherwise) -> Cause:
         title="gains, damping, armature or friction are far from the model file's",
         signature="The base fit explains the motion by itself, with numbers far from the file's.",
         others={
-            parameters[index].name: _factor(parameters[index], float(z[index])) for index in others
+            parameters[index].name: factor_of(parameters[index], float(z[index]))
+            for index in others
         },
     )
-
-
-def _factor(each: BaseParameter, z: float) -> float:
-    """Return a value over the nominal one."""
-    return each.value(z) / each.nominal

@@ -123,6 +123,15 @@ class Otherwise:
     """Smallest cosine between what the base explains by going far, and what they explain."""
 
 
+class Far(NamedTuple):
+    """Numbers of a base that are surely far from the model file (``far.py``)."""
+
+    fit: Fit
+    """Of which."""
+    numbers: list[int]
+    """Their places, furthest first."""
+
+
 class ByAll(NamedTuple):
     """Mean square residuals of a model fitted to all recordings, in noise floors.
 
@@ -186,6 +195,8 @@ class Search:
     """Segments of the final fit."""
     held: Held | None = None
     """Held-out recordings, as they were last looked at."""
+    far: Far | None = None
+    """What of a model's base is surely far from the file, as it was last asked."""
     by_all: ByAll | None = None
     """What the current model leaves once it is fitted to all recordings; None where it was not
     asked."""

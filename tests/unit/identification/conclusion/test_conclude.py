@@ -10,7 +10,7 @@ import pytest
 from shared.identification.conclusion.conclude import conclude
 from shared.identification.gate.held_out import Taken
 from shared.identification.search.bent import worse_than_file
-from shared.identification.search.searched import Otherwise
+from shared.identification.search.searched import Far, Otherwise
 from shared.identification.verdict import Unexplained
 from tests.searches import DRAG, ELBOW, LIFT, Searches
 
@@ -63,11 +63,12 @@ def test_where_nothing_is_named_the_sentence_says_what_the_base_is_far_from(sear
     z = searches.base.z.copy()
     z[index] = np.log(3.0)
     bent = dataclasses.replace(searches.base, z=z)
+    far = Far(bent, [index])
     said = "The base is far from the model file: kp elbow 3 times what it says."
-    none = conclude(dataclasses.replace(searches.search(_GOOD), current=bent), ())
+    none = conclude(dataclasses.replace(searches.search(_GOOD), current=bent, far=far), ())
     assert none.word == "none"
     assert none.sentence.endswith(said)
-    open_ = conclude(dataclasses.replace(searches.search(_BAD), current=bent), ())
+    open_ = conclude(dataclasses.replace(searches.search(_BAD), current=bent, far=far), ())
     assert open_.word == "unexplained"
     assert open_.sentence.endswith(said)
     assert said not in conclude(searches.search(_GOOD), ()).sentence

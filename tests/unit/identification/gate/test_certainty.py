@@ -29,6 +29,7 @@ class Line:
 
     shape: tuple[int, int]
     """Blocks, channels."""
+    base_size: int = 0
 
     @property
     def problem(self) -> "Line":
@@ -56,6 +57,18 @@ def test_intervals_cover_though_residuals_correlate(stretches: int, numbers: int
                   np.concatenate([jacobian, padding]), 0.0)  # fmt: skip
         covered.append(np.mean(np.abs(z) <= half_widths(fit, (0,))))
     assert 0.91 <= np.mean(covered) <= 0.99
+
+
+def test_what_residuals_do_not_show_of_the_base_is_as_unsure_as_beforehand():
+    """Scores of residuals have nothing of it, so by them alone it would be known exactly."""
+    rng = np.random.default_rng(3)
+    column, prior = rng.standard_normal((400, 1)), 1.5
+    jacobian = np.r_[np.c_[column, 1e-6 * column], np.diag([1e-3, 1.0 / prior])]
+    space = Line((400, 1), base_size=2)
+    fit = Fit(cast(Any, space), np.zeros(2), rng.standard_normal(402), jacobian, 0.0)
+    shown, hidden = half_widths(fit, (0,))
+    assert shown < 0.2
+    assert hidden == pytest.approx(1.96 * prior, rel=0.1)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,11 @@ from shared.identification.search.bent import (
     _brings_back,  # pyright: ignore[reportPrivateUsage]
     _known,  # pyright: ignore[reportPrivateUsage]
     _still_far,  # pyright: ignore[reportPrivateUsage]
-    _surely_far,  # pyright: ignore[reportPrivateUsage]
+)
+from shared.identification.search.far import (
+    _are_shown,  # pyright: ignore[reportPrivateUsage]
+    far_of,
+    surely_far,
 )
 from shared.sim.plant.row import Row
 from tests.geared import candidates
@@ -51,8 +55,16 @@ def test_a_base_of_which_the_recordings_say_that_it_is_far_stays_there(tmp_path:
     found = _still_far(base, space)
     assert found is not None
     names = [each.name for each in space.problem.parameters]
-    assert [names[index] for index in _surely_far(found)] == [NAME]
+    assert [names[index] for index in surely_far(found)] == [NAME]
     assert found.z[names.index(NAME)] == pytest.approx(np.log(8.0), rel=0.1)
+
+
+@pytest.mark.parametrize("is_far", [True, False])
+def test_a_number_that_can_be_put_back_at_no_cost_is_not_shown(tmp_path: Path, is_far: bool):
+    base, _ = bases(tmp_path, is_far=is_far)
+    index = [each.name for each in base.space.problem.parameters].index(NAME)
+    assert index in far_of(base)
+    assert _are_shown(base, [index]) is is_far
 
 
 @pytest.mark.parametrize(
