@@ -55,6 +55,7 @@ def identify(
     resume_folder: Path | None = None,
     without: Sequence[str] = (),
     catalogue: Sequence[Effect] | None = None,
+    threads: int = 1,
 ) -> Finding:
     """Return what the simulation of a data set gets wrong.
 
@@ -65,6 +66,7 @@ def identify(
         resume_folder: where the base fit is kept, and taken from if it is of the same data.
         without: effects of the catalogue to leave out.
         catalogue: other effects than the project's.
+        threads: of the physics; what is found does not depend on it.
 
     Raises:
         IdentificationError: the model does not fit the recordings, or an effect is unknown.
@@ -77,7 +79,7 @@ def identify(
         fits = None if folder is None else load(folder, of, seed)
         begins = begin(
             of, seed=seed, progress=progress, without=frozenset(without), catalogue=known,
-            fits=fits, aside=aside,
+            fits=fits, aside=aside, threads=threads,
         )  # fmt: skip
         if folder is not None:
             save(folder, of, seed, begins)

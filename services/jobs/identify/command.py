@@ -7,6 +7,7 @@ beside the data set. Subcommands make data sets and plan recordings.
 import argparse
 import dataclasses
 import importlib
+import os
 import shlex
 import shutil
 import sys
@@ -31,6 +32,8 @@ from shared.runtime.files import RunLock, require_free_space
 
 FREE_BYTES = 64 << 20
 LARGEST_SEED = 2**31 - 1
+THREADS, MOST_THREADS = 8, 256
+"""That simulate unless it is said, at most: a few dozen arms are simulated at once."""
 STEPS_FOLDER = "steps"
 """In the output folder: what each finished step found, for ``--resume``."""
 
@@ -76,6 +79,7 @@ def main(argv: Sequence[str]) -> int:
                     progress=display,
                     resume_folder=steps,
                     without=tuple(found.without),
+                    threads=found.threads,
                 )
         except KeyboardInterrupt:
             words = [*argv, *([] if found.resume else ["--resume"])]
@@ -134,7 +138,15 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
         "--without", nargs="+", action="extend", default=[], metavar="EFFECT",
         help="leave effects of the catalogue out",
     )  # fmt: skip
+    most = len(os.sched_getaffinity(0))
+    parser.add_argument(
+        "--threads", type=int, default=min(most, THREADS), metavar="N",
+        help=f"that simulate; what is found does not depend on it (the cores there are, up to "
+        f"{THREADS}: %(default)s)",
+    )  # fmt: skip
     found = parser.parse_args(argv)
+    if not 1 <= found.threads <= MOST_THREADS:
+        raise ConfigError(f"--threads is {found.threads}; allowed are 1 to {MOST_THREADS}")
     if not 0 <= found.seed <= LARGEST_SEED:
         raise ConfigError(f"--seed is {found.seed}; allowed are 0 to {LARGEST_SEED}")
     return found

@@ -101,10 +101,16 @@ def plant_of(dataset: Dataset, source: ModelSource | None = None) -> Plant:
     return plant if source.timestep is None else stepped(plant, source.timestep)
 
 
-def subject_of(dataset: Dataset, capacity: int = 128) -> Subject:
-    """Return the arm of a data set and what its recordings reach."""
+def subject_of(dataset: Dataset, capacity: int = 128, threads: int = 1) -> Subject:
+    """Return the arm of a data set and what its recordings reach.
+
+    Args:
+        dataset: the recordings.
+        capacity: the most arms that are simulated at once.
+        threads: of their physics.
+    """
     plant = plant_of(dataset)
-    nominal = Rollouts(plant, (), capacity)
+    nominal = Rollouts(plant, (), capacity, threads)
     q = np.concatenate([each.q for each in dataset.trajectories])
     motions = [motion_of(each) for each in dataset.trajectories]
     speeds, accelerations = (

@@ -1,4 +1,4 @@
-"""How fast an arm is at its first reading."""
+"""Where an arm is at its first reading, and how fast."""
 
 from typing import Final
 
@@ -66,6 +66,29 @@ def logged_velocities(at: Float64, q: Float64, qd: Float64) -> Float64:
     noises = _noise(q), _noise(qd)
     joints = zip(q.T, qd.T, *noises, strict=True)
     return np.array([_logged(at - at[0], *each) for each in joints], np.float64)
+
+
+def first_positions(at: Float64, q: Float64, velocity: Float64) -> Float64:
+    """Return where joints are at the first reading, float64[J].
+
+    Of those at rest that is the mean of as many of the first readings as are the same but for
+    noise: a single one is off by all of it, and a servo takes its time to take that back.
+
+    Args:
+        at: float64[T], times (s).
+        q: float64[T, J].
+        velocity: float64[J], at the first reading.
+    """
+    found = q[0].copy()
+    for joint, noise in enumerate(_noise(q)):
+        count = int(np.sum(at - at[0] <= WINDOW))
+        while velocity[joint] == 0.0 and count >= _FEWEST:
+            first = q[:count, joint]
+            if float(np.var(first)) < _FITS * float(noise) ** 2:
+                found[joint] = first.mean()
+                break
+            count //= 2
+    return found
 
 
 def _noise(readings: Float64) -> Float64:

@@ -9,7 +9,11 @@ import numpy as np
 from shared.config.site import nearest
 from shared.errors import IdentificationError
 from shared.identification.dataset import caveats, checks
-from shared.identification.dataset.beginnings import logged_velocities, surely_moving
+from shared.identification.dataset.beginnings import (
+    first_positions,
+    logged_velocities,
+    surely_moving,
+)
 from shared.identification.dataset.manifest import (
     FILE,
     Manifest,
@@ -137,7 +141,7 @@ def _trajectory(
     speed = surely_moving(times, q) if qd is None else logged_velocities(times, q, qd)
     made = Trajectory(
         name, entry.split, entry.repeats,
-        _initial(path, entry, "initial", joints, q[0], manifest.model),
+        _initial(path, entry, "initial", joints, first_positions(times, q, speed), manifest.model),
         _initial(path, entry, "initial_velocity", joints, speed, manifest.model),
         _seconds(command, zero), sent, times, q, qd, effort,
     )  # fmt: skip

@@ -183,9 +183,10 @@ class Problem:
         plant = self.subject.plant
         key = structure, timestep or plant.timestep
         if key not in self._arms:
-            capacity = _WITH_MORE if structure else self.subject.nominal.capacity
+            nominal = self.subject.nominal
+            capacity = _WITH_MORE if structure else nominal.capacity
             other = plant if timestep is None else stepped(plant, timestep)
-            self._arms[key] = Rollouts(other, structure, capacity)
+            self._arms[key] = Rollouts(other, structure, capacity, nominal.threads)
         return self._arms[key]
 
     def residuals(

@@ -37,7 +37,8 @@ def changed_by(fit: Fit, timestep: float) -> Float64:
     problem, variant = fit.space.problem, fit.variant
     test = problem.of("test")
     plant = stepped(problem.subject.plant, timestep)
-    subject = replace(problem.subject, plant=plant, nominal=Rollouts(plant, (), len(test)))
+    nominal = Rollouts(plant, (), len(test), problem.subject.nominal.threads)
+    subject = replace(problem.subject, plant=plant, nominal=nominal)
     other = Problem(
         subject, problem.dataset, problem.parameters, problem.noise, problem.window,
         aside=problem.aside,

@@ -50,6 +50,7 @@ def begin(
     catalogue: Sequence[Effect],
     fits: SavedFits | None = None,
     aside: tuple[Span, ...] = (),
+    threads: int = 1,
 ) -> Search:
     """Return a search with its base fitted.
 
@@ -61,13 +62,14 @@ def begin(
         catalogue: what is looked for.
         fits: the base's fit, if it was found before.
         aside: what nothing is fitted to; what happened once in such a recording is not looked for.
+        threads: of the physics.
 
     Raises:
         IdentificationError: the model does not fit the recordings.
     """
     rng = np.random.default_rng(seed)  # of the base fit, which may have been done before
     progress("noise floor", 0.0)
-    subject = subject_of(dataset)
+    subject = subject_of(dataset, threads=threads)
     noise = noise_of(dataset, BLOCK, subject.starts, subject.nominal)
     released = known = base_parameters(subject)
     creep = creep_of(subject)

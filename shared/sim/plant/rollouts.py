@@ -81,17 +81,19 @@ Entry = Callable[[Row], None]
 class Rollouts:
     """Arms of one structure, kept compiled."""
 
-    def __init__(self, plant: Plant, structure: Structure, capacity: int) -> None:
+    def __init__(self, plant: Plant, structure: Structure, capacity: int, threads: int = 1) -> None:
         """Compile it.
 
         Args:
             plant: the arm.
             structure: what effects have added to it.
             capacity: the most arms at once.
+            threads: that step them; results do not depend on it.
         """
         silence()
         self.plant = plant
         self.capacity = capacity
+        self.threads = threads
         self.model = compiled(plant, structure)
         for impedance in (self.model.dof_solimp, self.model.tendon_solimp_fri):
             impedance[:, :2] = np.maximum(impedance[:, :2], _STICKS)
@@ -102,7 +104,7 @@ class Rollouts:
         self._columns = np.concatenate(
             [_controls(self.model, int(self.model.actuator(name).id)) for name in plant.actuators]
         )
-        self._batch = mujoco.batch.Batch(self.model, nsim=capacity, nthread=1)
+        self._batch = mujoco.batch.Batch(self.model, nsim=capacity, nthread=threads)
         self._controllers: Controllers | None = None
         self._expanded: dict[str, Float64] = {}
         self._stale: set[str] = set()

@@ -1,5 +1,6 @@
 """`riposte identify` as it is typed."""
 
+import html
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -45,6 +46,7 @@ def test_a_folder_that_is_no_data_set_gets_one_line(
 def test_bad_options_get_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = dataset_at(tmp_path)
     assert "--seed is -1" in complaint(capsys, folder, "--seed", -1)
+    assert "--threads is 0" in complaint(capsys, folder, "--threads", 0)
     assert "is the data set itself" in complaint(capsys, folder, "--out", folder)
     assert "no such MJCF file" in complaint(capsys, folder, "--model", tmp_path / "no.xml")
     (tmp_path / "file").write_text("")
@@ -92,5 +94,5 @@ def test_a_hidden_effect_is_found_and_everything_is_left_behind(
     out = tmp_path / "identify-set"
     assert verdict == json.loads((out / "verdict.json").read_text())
     assert {"report.html", "recording.rrd", "verdict.json"} <= {e.name for e in out.iterdir()}
-    assert verdict["sentence"] in (out / "report.html").read_text()
+    assert verdict["sentence"] in html.unescape((out / "report.html").read_text())
     assert "base fit" in said.err
