@@ -1,6 +1,7 @@
 """What speaks for a cause."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -119,5 +120,21 @@ def test_beside_a_name_as_little_may_be_left_as_no_model_of_a_large_cause_is_wit
     before, after = 30.0 * _USUAL / _USUAL.mean(), left * _USUAL / _USUAL.mean()
     found = searches.search(before)
     found.accepted.append(searches.tried(ELBOW, before, after))
+    found.current_losses = after
+    assert is_open(found) is is_too_much
+
+
+@pytest.mark.parametrize(
+    ("before", "left", "is_too_much"),
+    [(200.0, 9.0, False), (200.0, 11.0, True), (20000.0, 39.0, False), (20000.0, 41.0, True)],
+)
+def test_where_the_base_is_doubted_less_may_be_left(
+    before: float, left: float, is_too_much: bool, tmp_path: Path
+) -> None:
+    searches = Searches(tmp_path)
+    first, after = before * _USUAL / _USUAL.mean(), left * _USUAL / _USUAL.mean()
+    found = searches.search(first)
+    found.doubted = ("mass elbow",)
+    found.accepted.append(searches.tried(ELBOW, first, after))
     found.current_losses = after
     assert is_open(found) is is_too_much
