@@ -1,6 +1,7 @@
 """Documents in which a part is made from the code: it stands between two markers."""
 
 import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from shared.errors import ConfigError, RiposteError
@@ -30,3 +31,25 @@ def renew(path: Path, begin: str, end: str, made: str) -> bool:
         sys.stderr.write(f"{path}: {reason}\n")
         return False
     return True
+
+
+def renew_main(
+    module: str, begin: str, end: str, describe: Callable[[], str], argv: Sequence[str] | None
+) -> int:
+    """Renew what stands between the markers of the one file that a command names.
+
+    Args:
+        module: that the command runs, for its usage.
+        begin: the first marker.
+        end: the last one.
+        describe: makes what stands between them.
+        argv: its words; those of this process if None.
+
+    Returns:
+        The exit code.
+    """
+    words = sys.argv[1:] if argv is None else argv
+    if len(words) != 1:
+        sys.stderr.write(f"usage: python -m {module} FILE\n")
+        return 2
+    return 0 if renew(Path(words[0]), begin, end, describe()) else 2

@@ -5,9 +5,8 @@
 
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
-from shared.messages.markdown import renew
+from shared.messages.markdown import renew_main
 from shared.telemetry.streams import DTYPES, STREAMS
 
 BEGIN = "<!-- columns:begin -->"
@@ -32,11 +31,7 @@ def describe() -> str:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Renew the tables in a document; return the exit code."""
-    words = sys.argv[1:] if argv is None else argv
-    if len(words) != 1:
-        sys.stderr.write("usage: python -m shared.telemetry.columns FILE\n")
-        return 2
-    return 0 if renew(Path(words[0]), BEGIN, END, describe()) else 2
+    return renew_main("shared.telemetry.columns", BEGIN, END, describe, argv)
 
 
 if __name__ == "__main__":

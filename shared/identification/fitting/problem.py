@@ -107,6 +107,11 @@ class Problem:
             aside=self.aside, _arms=self._arms,
         )  # fmt: skip
 
+    def without(self, gone: Sequence[int]) -> "Problem":
+        """Return the same with some parameters as the model file has them, by their places."""
+        kept = tuple(each for index, each in enumerate(self.parameters) if index not in gone)
+        return replace(self, parameters=kept)
+
     def smooth(self) -> "Problem":
         """Return the same with commands that move on straight lines, not from step to step."""
         is_pose = self.subject.control == "pose"

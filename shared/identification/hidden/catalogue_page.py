@@ -7,14 +7,13 @@ import inspect
 import re
 import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 from shared.identification.arm.subject import Subject, subject_of
 from shared.identification.catalogue import effects
 from shared.identification.effect import Effect, Side
 from shared.identification.hidden.generator import simulated
 from shared.identification.hidden.recipe import Recipe
-from shared.messages.markdown import renew
+from shared.messages.markdown import renew_main
 from shared.sim.hidden.arms import ArmName
 
 BEGIN = "<!-- effects:begin -->"
@@ -92,11 +91,7 @@ def _plain(text: str) -> str:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Renew the list in a document; return the exit code."""
-    words = sys.argv[1:] if argv is None else argv
-    if len(words) != 1:
-        sys.stderr.write("usage: python -m shared.identification.hidden.catalogue_page FILE\n")
-        return 2
-    return 0 if renew(Path(words[0]), BEGIN, END, describe()) else 2
+    return renew_main("shared.identification.hidden.catalogue_page", BEGIN, END, describe, argv)
 
 
 if __name__ == "__main__":

@@ -222,9 +222,7 @@ def _drives(
 
 def _held(done: BaseFits, gone: Sequence[int]) -> BaseFits:
     """Return a base's fits with some of its parameters as the model file has them."""
-    problem = done.whole.space.problem
-    kept = tuple(each for index, each in enumerate(problem.parameters) if index not in gone)
-    return fit_without(Space(replace(problem, parameters=kept)), done, gone)
+    return fit_without(Space(done.whole.space.problem.without(gone)), done, gone)
 
 
 def doubted_of(fit: Fit) -> list[int]:

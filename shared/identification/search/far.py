@@ -1,7 +1,6 @@
 """Which numbers of a base are far from what the model file says, and how surely."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -67,9 +66,7 @@ def shown_far(found: Search) -> list[int]:
 
 def _are_shown(fit: Fit, numbers: Sequence[int]) -> bool:
     """Return whether a fit with some numbers as the model file has them is surely worse."""
-    known = fit.space.problem.parameters
-    kept = tuple(each for place, each in enumerate(known) if place not in numbers)
-    problem = replace(fit.space.problem, parameters=kept)
+    problem = fit.space.problem.without(numbers)
     space, least = Space(problem, fit.space.candidates), fit.cost + _SHOWN
     start = np.delete(fit.z, numbers)
     return polish(space, start, problem.of("train"), _STEPS, wanted=least).cost > least
