@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shared.identification.arm.motion import smooth_motion
 from shared.identification.arm.smoothing import smooth_states
 from shared.identification.dataset.types import Float64, Trajectory
 from shared.sim.plant.plant import Control
@@ -21,9 +22,11 @@ class Cut:
     """Readings that a state is taken from, either side together (s)."""
     spread: float = np.inf
     """The most that noise spreads in a part (1)."""
+    dodge: float = 0.0
+    """For how long a part may be put off while a joint turns round or stops (s)."""
 
 
-CUTS: dict[Control, Cut] = {"torque": Cut(0.3, 0.05), "pose": Cut(1.0, 0.1, spread=4.0)}
+CUTS: dict[Control, Cut] = {"torque": Cut(0.3, 0.05, dodge=0.1), "pose": Cut(1.0, 0.1, spread=4.0)}
 """Where a controller does not hold the arm to its command.
 
 Torques let an arm drift off. Poses leave the elbow of an arm of seven joints free: a start that is
@@ -31,6 +34,12 @@ off by 0.4 mrad, less than a reading, became 40 mrad within 6 s, at a tool where
 a tool is held, damping takes a wrong speed away; where such an arm gives, random torques leave four
 to five floors.
 """
+_SLOW = 0.02
+"""Of a joint's speed where it is fast: below that it stands."""
+_PLACES = 11
+"""Begins of a part that are looked at."""
+_CLEAR = 0.7
+"""Of what a state is taken from: a kink that far away does not matter."""
 CUT = Cut(1.0, 0.05)
 """Of any other arm."""
 
@@ -43,13 +52,17 @@ def width_of(period: float, cut: Cut) -> int:
 def spans_of(trajectory: Trajectory, cut: Cut) -> Float64:
     """Return float64[P, 2], when parts begin and end; none of a recording too short to be cut (s).
 
-    Each ends where the next one begins: no reading is of two parts.
+    No reading is of two parts; of none are those at both ends, and those for which one is put off.
     """
     at, period = trajectory.joints_at, _period(trajectory)
     width = width_of(period, cut)
     if len(_even(trajectory)) <= 2 * width:
         return np.zeros((0, 2))
-    begins = np.arange(at[0] + width * period, at[-1] - 0.5 * cut.length, cut.length)
+    first, last = float(at[0] + width * period), float(at[-1] - 0.5 * cut.length)
+    if cut.dodge:
+        begins = _put_off(first, last, _kinks(trajectory, cut), cut)
+        return np.stack([begins, begins + cut.length], axis=1)
+    begins = np.arange(first, last, cut.length)
     return np.stack([begins, np.r_[begins[1:], begins[-1:] + cut.length]], axis=1)
 
 
@@ -107,6 +120,36 @@ def part_of(
         logged_tracker=tracker_of(trajectory, begin),
     )
     return recorded, joints, tracker
+
+
+def _kinks(trajectory: Trajectory, cut: Cut) -> Float64:
+    """Return float64[K], when a joint begins to move, stops or turns round (s), rising.
+
+    Dry friction turns round then, and a speed that has a kink is no polynomial's.
+    """
+    motion = smooth_motion(trajectory.joints_at, trajectory.q, cut.smooth)
+    fast = np.quantile(np.abs(motion.qd), 0.98, axis=0)
+    way = np.sign(motion.qd) * (np.abs(motion.qd) > _SLOW * fast)
+    return motion.at[1:][np.any(np.diff(way, axis=0) != 0.0, axis=1)]
+
+
+def _put_off(first: float, last: float, kinks: Float64, cut: Cut) -> Float64:
+    """Return float64[P], begins of parts: each as soon as the one before ends and no kink is near.
+
+    Args:
+        first: when the first part may begin (s).
+        last: before when the last one must (s).
+        kinks: float64[K] (s).
+        cut: says how long parts are, and how long one may be put off.
+    """
+    off = cut.dodge * np.linspace(0.0, 1.0, _PLACES)
+    begins: list[float] = []
+    begin = first
+    while begin < last:
+        near = np.abs(begin + off[:, None] - kinks).min(axis=1, initial=np.inf)
+        begins.append(begin + float(off[np.argmax(np.minimum(near, _CLEAR * cut.smooth))]))
+        begin = begins[-1] + cut.length
+    return np.array(begins)
 
 
 def tracker_of(trajectory: Trajectory, begin: float = 0.0) -> Signal | None:

@@ -26,6 +26,7 @@ from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.signals import pose_error, sampled, sampled_poses
 
 Integers = NDArray[np.intp]
+Bools = NDArray[np.bool_]
 
 _BAND = 25
 """Without repeats: readings that a local cubic is taken through."""
@@ -250,21 +251,26 @@ def _difference(
 ) -> Difference:
     spans = np.zeros((0, 2)) if cut is None else spans_of(first, cut)
 
-    def parts_of(at: Float64, count: int) -> Integers:
+    def parts_of(at: Float64, count: int) -> tuple[Integers, Bools]:
+        """Return which part each block is of, the last that has begun, and whether it is in it."""
         times = block_means(at, at[:, None], block)[:count, 0]
-        return np.searchsorted(spans[:, 0], times, side="right")
+        parts = np.searchsorted(spans[:, 0], times, side="right")
+        ends = np.r_[np.inf, spans[:, 1]]
+        if cut is None or not cut.dodge:  # what follows the last part is counted as of it
+            ends[-1] = np.inf
+        return parts, times < ends[parts]
 
     joints = block_means(first.joints_at, _against(first, second, starts), block)
     q = block_means(first.joints_at, first.q, block)[: len(joints)]
-    is_known = np.isfinite(joints).all(axis=1)
-    parts = parts_of(first.joints_at, len(joints))[is_known]
-    found = Difference(joints[is_known], None, q[is_known], parts, None)
+    parts, is_in = parts_of(first.joints_at, len(joints))
+    is_known = np.isfinite(joints).all(axis=1) & is_in
+    found = Difference(joints[is_known], None, q[is_known], parts[is_known], None)
     if first.tracker_at is None or second.tracker_at is None:
         return found
     tracker = block_means(first.tracker_at, _tracker_against(first, second, starts), block)
-    is_known = np.isfinite(tracker).all(axis=1)
-    parts = parts_of(first.tracker_at, len(tracker))[is_known]
-    return replace(found, tracker=tracker[is_known], tracker_parts=parts)
+    parts, is_in = parts_of(first.tracker_at, len(tracker))
+    is_known = np.isfinite(tracker).all(axis=1) & is_in
+    return replace(found, tracker=tracker[is_known], tracker_parts=parts[is_known])
 
 
 def _against(first: Trajectory, second: Trajectory, starts: Starts) -> Float64:

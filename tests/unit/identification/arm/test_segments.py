@@ -54,3 +54,24 @@ def test_no_reading_is_of_two_parts(tmp_path: Path):
     segments = segments_of(dataset, subject_of(dataset), 0.1)
     at = np.concatenate([each.recorded.begin + each.recorded.joints_at for each in segments])
     assert np.diff(at).min() > 1e-3
+
+
+def test_a_part_is_put_off_while_a_joint_turns_round(tmp_path: Path):
+    """To and fro at 1 rad/s: by the clock, every 0.3 s, parts would begin while it turns."""
+    at = 0.002 * np.arange(2000, dtype=np.float64)
+    q = np.abs((at + 0.13) % 1.1 - 0.55)[:, None]
+    path = tmp_path / "link.xml"
+    path.write_text(_PENDULUM.format(timestep=0.002))
+    swing = Trajectory("swing", "train", "", q[0], np.zeros(1), at, 0.0 * q, at, q)
+    dataset = _dataset(tmp_path, path, swing)
+    segments = segments_of(dataset, subject_of(dataset))
+    begins = np.array([each.recorded.begin for each in segments])
+    turns = 0.55 * np.arange(9) - 0.13
+    assert np.abs(begins[:, None] - turns).min() > 0.025
+    assert np.diff(begins).min() > 0.3 - 1e-9
+    assert np.diff(begins).max() < 0.4 + 1e-9
+    assert {len(each.q) for each in segments[:-1]} <= {149, 150, 151}
+    for each in segments:
+        assert each.recorded.initial_q[0] == pytest.approx(
+            np.interp(each.recorded.begin, at, q[:, 0]), abs=1e-6
+        )
