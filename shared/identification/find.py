@@ -25,6 +25,7 @@ from shared.identification.search.again import fresh, leave_out, pushed_in
 from shared.identification.search.bare import counted_by_torque
 from shared.identification.search.begin import begin, begin_without, doubted_of
 from shared.identification.search.bent import is_worse, otherwise, worse_than_file
+from shared.identification.search.cleared import clear
 from shared.identification.search.likeness import is_only_like
 from shared.identification.search.misstated import misstated
 from shared.identification.search.once import is_named, take_back_pushes, take_pushes
@@ -155,6 +156,7 @@ def _searched(
     seed, progress, clock = run.seed, run.progress, run.clock
     untouched = fresh(found, seed)
     search(found, progress)
+    clear(found, progress)
     clock.over("search")
     progress("unexplained", 0.0)
     left = _left(found, known)

@@ -1,0 +1,50 @@
+"""Links that were held are let go once causes are named, and doubted no more if they stay."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shared.identification.progress import silent
+from shared.identification.search.cleared import clear
+from shared.identification.search.searched import Search, is_open
+from shared.sim.plant.row import Row
+from tests.measured import Enter, nothing
+from tests.searches import ELBOW, Searches
+
+_HELD = "mass elbow"
+_BASE, _LEFT = np.full(8, 200.0), np.full(8, 15.0)
+
+
+def _heavier(row: Row) -> None:
+    body = row.body_of("elbow")
+    row.field("body_mass")[body] *= 2.0
+    row.field("body_inertia").reshape(-1, 3)[body] *= 2.0
+
+
+def _doubted(folder: Path, enter: Enter) -> Search:
+    """Return a search of an arm whose base lacks one number, with a cause that leaves much."""
+    searches = Searches(folder, enter=enter)
+    names = [each.name for each in searches.problem.parameters]
+    searches.problem = searches.problem.without([names.index(_HELD)])
+    searches.base = searches.fit(())
+    found = searches.search(_BASE, searches.tried(ELBOW, _BASE, _LEFT), doubted=(_HELD,))
+    assert is_open(found)
+    return found
+
+
+@pytest.mark.parametrize(("enter", "doubted"), [(nothing, ()), (_heavier, (_HELD,))])
+def test_a_link_that_is_let_go_says_whether_it_is_to_be_doubted(
+    tmp_path: Path, enter: Enter, doubted: tuple[str, ...]
+):
+    found = _doubted(tmp_path, enter)
+    clear(found, silent)
+    assert found.doubted == doubted
+    assert is_open(found) == bool(doubted)
+
+
+def test_what_is_left_of_an_arm_without_doubts_may_be_too_much_as_well(tmp_path: Path):
+    found = _doubted(tmp_path, nothing)
+    found.current_losses = np.full(8, 0.2 * 200.0)
+    clear(found, silent)
+    assert found.doubted == (_HELD,)
