@@ -26,7 +26,7 @@ from shared.errors import ConfigError
 from shared.identification.catalogue import effects
 from shared.identification.dataset.caveats import in_words
 from shared.identification.dataset.reading import read_dataset
-from shared.identification.dataset.types import Dataset, ModelSource
+from shared.identification.dataset.types import Dataset
 from shared.identification.find import identify
 from shared.runtime.files import RunLock, require_free_space
 
@@ -185,8 +185,7 @@ def _dataset(folder: Path, model: Path | None) -> Dataset:
         return dataclasses.replace(dataset, source=dataclasses.replace(source, parameters=model))
     if not is_file:
         raise ConfigError(f"--model {model}: there is no such MJCF file")
-    mjcf = ModelSource("mjcf", model, tracked=source.tracked)
-    return dataclasses.replace(dataset, source=mjcf)
+    return dataclasses.replace(dataset, source=dataclasses.replace(source, path=model))
 
 
 def _out_folder(dataset: Path, out: Path | None) -> Path:

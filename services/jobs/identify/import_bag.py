@@ -59,6 +59,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--tracked", default="", metavar="NAME", help="site or body of an MJCF that is tracked"
     )
     parser.add_argument(
+        "--encoders",
+        choices=("motor", "link"),
+        help="side of an MJCF's gears that was logged (not said: both are tried)",
+    )
+    parser.add_argument(
         "--control", choices=("pose", "position", "torque"), default="pose",
         help="what a command is (%(default)s)",
     )  # fmt: skip
@@ -88,7 +93,7 @@ def run(found: argparse.Namespace) -> int:
     """Write the data set, and say what is in it."""
     is_mjcf = found.model is not None and found.model.suffix == ".xml"
     if is_mjcf:
-        source = ModelSource("mjcf", found.model, tracked=found.tracked)
+        source = ModelSource("mjcf", found.model, tracked=found.tracked, encoders=found.encoders)
     else:
         source = ModelSource("pr2", arm=found.arm, parameters=found.model)
     logs: list[Log] = []

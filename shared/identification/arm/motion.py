@@ -39,13 +39,16 @@ def motion_of(trajectory: Trajectory) -> Motion:
     return smooth_motion(trajectory.joints_at, trajectory.q)
 
 
-def smooth_motion(at: Float64, readings: Float64, width: float = _SMOOTH) -> Motion:
+def smooth_motion(
+    at: Float64, readings: Float64, width: float = _SMOOTH, degree: int = 3
+) -> Motion:
     """Return the motion of positions, as :func:`motion_of`.
 
     Args:
         at: float64[T], instants (s).
         readings: float64[T, J] (rad, m).
         width: of what a speed is taken from, either side together (s).
+        degree: of the polynomials; 4 bends accelerations less than 3 and takes twice the width.
     """
     period = max(_PERIOD, float(np.median(np.diff(at))))
     even: Float64 = np.arange(float(at[0]), float(at[-1]), period, dtype=np.float64)
@@ -54,7 +57,7 @@ def smooth_motion(at: Float64, readings: Float64, width: float = _SMOOTH) -> Mot
         still = np.zeros_like(readings)
         return Motion(readings, still, still, at)
     near = period * np.arange(-half, half + 1)
-    fit = np.linalg.pinv(np.vander(near, 4, increasing=True))
+    fit = np.linalg.pinv(np.vander(near, degree + 1, increasing=True))
     q = sampled(at, readings, even)
     windows = np.lib.stride_tricks.sliding_window_view(q, 2 * half + 1, axis=0)
     inner = even[half : len(even) - half]

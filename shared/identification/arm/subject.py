@@ -97,7 +97,14 @@ def plant_of(dataset: Dataset, source: ModelSource | None = None) -> Plant:
         return plant
     if source.path is None:
         raise IdentificationError('[model] kind = "mjcf" needs path, the MJCF file')
-    plant = mjcf(source.path, dataset.control, dataset.joints, dataset.actuators, source.tracked)
+    plant = mjcf(
+        source.path,
+        dataset.control,
+        dataset.joints,
+        dataset.actuators,
+        source.tracked,
+        encoders=source.encoders or "motor",
+    )
     return plant if source.timestep is None else stepped(plant, source.timestep)
 
 

@@ -21,7 +21,7 @@ _BRAKE = 0.1
 
 
 class Backlash:
-    """A gap after the encoder, whose flanks do not bounce; MuJoCo's manual builds it so, too."""
+    """A gap between motor and link; its flanks do not bounce. MuJoCo's manual builds it so, too."""
 
     name = "backlash"
     title = "the joint's gear has play"

@@ -7,7 +7,7 @@ from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
 from shared.identification.laws.series import link_inertia, series
-from shared.identification.laws.sway import start_swaying
+from shared.identification.laws.sway import start_stretched, start_swaying
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure, series_name
 
@@ -19,7 +19,7 @@ _SWING = 0.06
 
 
 class JointElasticity:
-    """A torsion spring after the encoder."""
+    """A torsion spring between motor and link."""
 
     name = "joint_elasticity"
     title = "the joint's transmission gives like a spring"
@@ -49,7 +49,10 @@ class JointElasticity:
         row.spring(name, compliance, ringing=2.0 * _DAMPING * math.sqrt(inertia))
         if compliance:
             row.trust_encoders()
-            start_swaying(row, [name], _SWING)
+            if row.plant.encoders == "link":
+                start_stretched(row, name)
+            else:
+                start_swaying(row, [name], _SWING)
 
 
 EFFECT = JointElasticity()

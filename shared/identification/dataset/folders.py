@@ -47,4 +47,6 @@ def model_table(source: ModelSource, folder: Path) -> dict[str, Any]:
             model[key] = os.path.relpath(path.absolute(), folder)
     if source.tracked:
         model["tracked"] = source.tracked
+    if source.encoders is not None:
+        model["encoders"] = source.encoders
     return model

@@ -11,7 +11,7 @@ from shared.config import toml
 from shared.config.location import line_of
 from shared.config.site import nearest
 from shared.errors import IdentificationError
-from shared.identification.dataset.types import Control, Kind, Split
+from shared.identification.dataset.types import Control, Encoders, Kind, Split
 
 FILE: Final = "dataset.toml"
 SCHEMA: Final = 1
@@ -37,6 +37,8 @@ class ModelTable(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """A ``model.toml``, from the data set's folder; only of ``kind = "pr2"``."""
     tracked: str = ""
     """Site or body that the tracker is fixed to; only of ``kind = "mjcf"``."""
+    encoders: Encoders | None = None
+    """Which side of the joints' gears was logged; only of ``kind = "mjcf"``."""
 
     def __post_init__(self) -> None:
         """Refuse what belongs to the other kind."""
@@ -45,8 +47,8 @@ class ModelTable(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
                 raise ValueError('kind = "mjcf" needs path, the MJCF file')
             if self.parameters or self.arm != "right":
                 raise ValueError('arm and parameters belong to kind = "pr2": take them out')
-        elif self.path or self.tracked:
-            raise ValueError('path and tracked belong to kind = "mjcf": take them out')
+        elif self.path or self.tracked or self.encoders:
+            raise ValueError('path, tracked and encoders belong to kind = "mjcf": take them out')
 
 
 class TrajectoryTable(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

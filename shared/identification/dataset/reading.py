@@ -84,7 +84,7 @@ def _source(folder: Path, model: ModelTable, files: Files) -> ModelSource:
     if model.kind == "mjcf":
         path = folder / model.path
         files.read(path)
-        return ModelSource("mjcf", path, tracked=model.tracked)
+        return ModelSource("mjcf", path, tracked=model.tracked, encoders=model.encoders)
     parameters = folder / model.parameters if model.parameters else None
     if parameters is not None:
         files.read(parameters)

@@ -16,6 +16,8 @@ Control = Literal["pose", "position", "torque"]
 """What a command is: a pose of the tool, a position per joint, or a torque per joint."""
 Split = Literal["train", "test"]
 Kind = Literal["pr2", "mjcf"]
+Encoders = Literal["motor", "link"]
+"""Which side of a joint's gear its readings are of."""
 
 POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
 """Columns of a pose: position (m) and unit quaternion, in the robot's base frame."""
@@ -34,6 +36,8 @@ class ModelSource:
     """A ``model.toml`` of a PR2; None is the nominal model."""
     tracked: str = ""
     """Site or body of an MJCF that the tracker is fixed to."""
+    encoders: Encoders | None = None
+    """Of an MJCF's joints; None where nobody said. A servo goes by the motor's side anyway."""
     timestep: float | None = None
     """Of the physics of an MJCF (s), if it is not to be the file's."""
 
@@ -115,6 +119,11 @@ class Dataset:
     def has_tracker(self) -> bool:
         """Whether every trajectory was tracked."""
         return all(each.tracker is not None for each in self.trajectories)
+
+
+def with_encoders(dataset: Dataset, encoders: Encoders) -> Dataset:
+    """Return the recordings as of encoders on one side of the joints' gears."""
+    return replace(dataset, source=replace(dataset.source, encoders=encoders))
 
 
 def with_timestep(dataset: Dataset, timestep: float) -> Dataset:

@@ -29,17 +29,29 @@ class _Saved(msgspec.Struct, frozen=True, kw_only=True):
 def save(folder: Path, dataset: Dataset, seed: int, found: Search) -> None:
     """Write the base fit of a search, in a folder that need not be there."""
     folder.mkdir(parents=True, exist_ok=True)
+    fits = fits_of(found)
     kept = _Saved(
         dataset=dataset.hash,
         model=repr(dataset.source),
         seed=seed,
-        parameters=[each.name for each in found.problem.parameters],
-        parts=found.base_parts.z.tolist(),
-        whole=found.base.z.tolist(),
-        starts_agree=found.base.starts_agree,
-        is_torque=found.problem.noise.is_torque,
+        parameters=list(fits.names),
+        parts=list(fits.parts),
+        whole=list(fits.whole),
+        starts_agree=fits.starts_agree,
+        is_torque=fits.is_torque,
     )
     atomic_write(folder / FILE, msgspec.json.encode(kept))
+
+
+def fits_of(found: Search) -> SavedFits:
+    """Return the base fit of a search, for another one to begin with."""
+    return SavedFits(
+        tuple(each.name for each in found.problem.parameters),
+        tuple(found.base_parts.z.tolist()),
+        tuple(found.base.z.tolist()),
+        found.base.starts_agree,
+        found.problem.noise.is_torque,
+    )
 
 
 def load(folder: Path, dataset: Dataset, seed: int) -> SavedFits | None:

@@ -45,12 +45,14 @@ class Seen(NamedTuple):
 def seen_by_tracker(row: Row, label: str, half: float) -> Seen | None:
     """Return where a link is beside its motor at the start, as a tracker saw it; None without one.
 
+    None, too, where encoders see what the tracker sees.
+
     Args:
         row: the arm; what begins with its recording begins at rest.
         label: the logged joint.
         half: of the gap (rad, m).
     """
-    if row.logged_tracker is None:
+    if row.logged_tracker is None or row.plant.encoders == "link":
         return None
     joint = row.plant.labels.index(label)
     return _seen(row.plant, row.model, row.logged_q, row.logged_tracker, joint, half)

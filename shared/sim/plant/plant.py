@@ -17,6 +17,7 @@ from shared.sim.config import SimConfig
 from shared.sim.parameters import CommandParameters, load_parameters
 
 Control = Literal["pose", "position", "torque"]
+EncoderSide = Literal["motor", "link"]
 Model = mujoco.MjModel
 """For those who pass one on and do not look into it."""
 TOOL = "riposte/tool"
@@ -56,6 +57,8 @@ class Plant:
     """What the tracker and the payload are fixed to."""
     command: CommandParameters = field(default_factory=CommandParameters)
     """What is known to lie between a command and the controller."""
+    encoders: EncoderSide = "motor"
+    """Which side of a joint's gear its logged position is of; servos go by the motor's."""
     rough_timestep: float | None = None
     """A longer step that does for what a change of the arm changes (s); None if there is none."""
 
@@ -112,7 +115,12 @@ def is_weightless(model: mujoco.MjModel) -> bool:
 
 
 def mjcf(
-    path: Path, control: Control, joints: Sequence[str], actuators: Sequence[str], tracked: str
+    path: Path,
+    control: Control,
+    joints: Sequence[str],
+    actuators: Sequence[str],
+    tracked: str,
+    encoders: EncoderSide = "motor",
 ) -> Plant:
     """Return the arm of an MJCF file.
 
@@ -122,6 +130,7 @@ def mjcf(
         joints: the logged ones.
         actuators: the command's columns, each the name of an actuator or of a joint.
         tracked: site or body that a tracker is fixed to; empty: the last joint's body.
+        encoders: which side of the joints' gears was logged.
 
     Raises:
         IdentificationError: the file cannot be used, or does not have what the log names.
@@ -193,6 +202,7 @@ def mjcf(
         timestep=float(compiled.opt.timestep),
         base_body=names.body(_root(compiled, int(last))),
         tool_body=tool,
+        encoders=encoders,
     )
 
 

@@ -18,7 +18,7 @@ from shared.sim.plant.plant import TOOL, Plant
 from shared.sim.plant.row import JointsReport, Row, TrackerReport
 from shared.sim.plant.signals import Signal, filtered, sampled, sampled_poses
 from shared.sim.plant.step import Moment, Step, rows_of
-from shared.sim.plant.structure import Structure, compiled
+from shared.sim.plant.structure import Structure, compiled, series_joints
 
 _CHUNK = 250
 """Steps that a batch takes between two looks at what it recorded."""
@@ -101,6 +101,7 @@ class Rollouts:
         self._qpos = np.array([int(joint.qposadr[0]) for joint in self._joints])
         self._dofs = np.array([int(joint.dofadr[0]) for joint in self._joints])
         self._logged, self._moved = rows_of(self._qpos), rows_of(self._dofs)
+        self._beyond = _beyond(plant, self.model)
         self._columns = np.concatenate(
             [_controls(self.model, int(self.model.actuator(name).id)) for name in plant.actuators]
         )
@@ -169,7 +170,7 @@ class Rollouts:
         wants_tool = any(recorded.tracker_at is not None for _, recorded in work)
         q = np.empty((len(rows), steps + 1, len(self._qpos)))
         tool = np.empty((len(rows), steps + 1, 7)) if wants_tool else None
-        q[:, 0] = qpos[ids][:, self._qpos]
+        q[:, 0] = self._read(qpos[ids])
         laws, frictions = torques_of(rows), frictions_of(rows)
         has_laws = any(row.has_laws for row in rows)
         at: Float64 = timestep * np.arange(steps, dtype=np.float64)
@@ -252,8 +253,16 @@ class Rollouts:
             self._batch.set_const(np.arange(len(rows) if needs else self.capacity))
         self._needs_constants = needs
 
+    def _read(self, qpos: Float64) -> Float64:
+        """Return float64[..., J], what right encoders say in a state: float64[..., Q]."""
+        q = qpos[..., self._logged]
+        return q if self._beyond is None else q + qpos @ self._beyond
+
     def _settle(self, rows: Sequence[Row]) -> None:
-        """Put added joints where their loads leave them; twice, as that changes the loads."""
+        """Put added joints where their loads leave them; twice, as that changes the loads.
+
+        Where encoders see the link, the motor is what starts elsewhere than the log says.
+        """
         qpos, bias = self._batch.bind("qpos"), self._batch.bind("qfrc_bias")
         for _ in range(2):
             self._batch.forward(np.arange(len(rows)), stage=mujoco.mjtStage.mjSTAGE_VEL)
@@ -262,16 +271,20 @@ class Rollouts:
                     joint = self.model.joint(name)
                     load = float(bias[row.index, joint.dofadr[0]])
                     qpos[row.index, joint.qposadr[0]] = rests(load)
+                if self._beyond is not None:
+                    qpos[row.index, self._qpos] = row.initial_q - qpos[row.index] @ self._beyond
         qvel = self._batch.bind("qvel")
         for row in rows:
             for name, speed in row.speeds.items():
                 qvel[row.index, self.model.joint(name).dofadr[0]] = speed
+            if self._beyond is not None:  # all joints are hinges and slides: qvel is as qpos
+                qvel[row.index, self._dofs] = row.initial_qd - qvel[row.index] @ self._beyond
 
     def _open(self, ids: np.ndarray, ctrl: Float64) -> tuple[Float64, Float64]:
         found = self._batch.rollout(
             ctrl.shape[1], control=ctrl, record=("qpos", "sensordata"), ids=ids
         )
-        return found["qpos"][:, :, self._logged], found["sensordata"][:, :, self._tool]
+        return self._read(found["qpos"]), found["sensordata"][:, :, self._tool]
 
     def _closed(
         self,
@@ -332,7 +345,7 @@ class Rollouts:
             applied[arms, moved] = added
             self._speed_before = speed
             batch.step(ids)
-            q[:, index] = qpos[arms, logged]
+            q[:, index] = self._read(qpos[arms])
             tool[:, index] = sensors[arms, self._tool]
         if frictions:
             rubs[arms, moved] = rubbed
@@ -372,6 +385,21 @@ def _controls(model: mujoco.MjModel, actuator: int) -> np.ndarray:
     """Return which of the model's controls are an actuator's."""
     first = int(model.actuator_ctrladr[actuator])
     return np.arange(first, first + int(model.actuator_ctrlnum[actuator]))
+
+
+def _beyond(plant: Plant, model: mujoco.MjModel) -> Float64 | None:
+    """Return float64[Q, J]: whose positions, of added joints, are in what an encoder says.
+
+    None where that is what its motor does alone.
+    """
+    if plant.encoders == "motor":
+        return None
+    out = np.zeros((model.nq, len(plant.labels)))
+    for column, label in enumerate(plant.labels):
+        for joint in series_joints(plant, model, label):
+            if model.joint(joint).name != plant.mj_joint(label):
+                out[model.jnt_qposadr[joint], column] = 1.0
+    return out if out.any() else None
 
 
 def _motion_of(row: Row, recorded: Recorded) -> Hashable:

@@ -10,6 +10,7 @@ from shared.identification.arm.subject import Subject
 from shared.identification.catalogue.backlash import EFFECT as BACKLASH
 from shared.identification.catalogue.joint_elasticity import EFFECT as ELASTICITY
 from shared.identification.dataset.types import Float64
+from shared.identification.effect import Effect
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.plant import pr2
 from shared.sim.plant.rollouts import Recorded, Reports
@@ -116,3 +117,17 @@ def test_a_pose_controller_goes_by_the_encoders_and_lets_the_tool_bend() -> None
     assert seen.max() > 1e-3
     # A controller that saw the bend would hold the tool and let the encoders stray: 0.4 here.
     assert np.sqrt(np.mean(seen**2)) > 1.2 * np.sqrt(np.mean(believed**2))
+
+
+@pytest.mark.parametrize(("effect", "size"), [(ELASTICITY, 0.02), (BACKLASH, 0.02)])
+def test_encoders_of_the_link_see_what_a_tracker_sees(
+    subject: Subject, effect: Effect, size: float
+) -> None:
+    """And the link, not its motor, begins where the log says."""
+    seeing = replace(subject, plant=replace(subject.plant, encoders="link"))
+    settled = replay(subject, recorded([0.0, 0.0, 0.0], 3.0)).q[-1]
+    held = recorded([0.0, 0.0, 0.0], 0.5, settled)
+    of_motor, of_link = (replay(each, held, effect, "elbow", [size]) for each in (subject, seeing))
+    assert abs(_unseen_pitch(of_motor)).max() > 0.4 * size * min(1.0, _ELBOW_WEIGHT)
+    np.testing.assert_allclose(_unseen_pitch(of_link), 0.0, atol=1e-3 * size)
+    np.testing.assert_allclose(of_link.q[0], settled, atol=1e-3 * size)

@@ -146,6 +146,8 @@ def test_angles_that_jump_by_a_turn_are_made_continuous(tmp_path):
         ('name = "two"', 'nmae = "two"', "dataset.toml:10: trajectory.nmae: unknown key; did you"),
         ('kind = "mjcf"', 'kind = "mjfc"', "dataset.toml:4: model.kind: invalid enum value 'mjfc'"),
         ('path = "arm.xml"', "", "needs path"),
+        ('path = "arm.xml"', 'path = "arm.xml"\nencoders = "load"', "model.encoders: invalid enum"),
+        ('kind = "mjcf"\npath = "arm.xml"', 'kind = "pr2"\nencoders = "link"', "take them out"),
         ('path = "arm.xml"', 'path = "leg.xml"', "leg.xml is missing"),
         ('name = "two"', 'name = "one"', "2 trajectories are called 'one'"),
         ('name = "two"', 'name = "../two"', "name of a folder"),

@@ -11,7 +11,9 @@ from shared.errors import IdentificationError
 from shared.identification.dataset.reading import PR2_JOINTS, read_dataset
 from shared.identification.dataset.types import POSE, Dataset, ModelSource, Trajectory
 from shared.identification.dataset.writing import write_dataset
-from tests.unit.identification.dataset.folders import written
+from tests.unit.identification.dataset.folders import MANIFEST, written
+
+_BEYOND = '[model]\nencoders = "link"'
 
 
 def moving(name: str, split: str, seed: int) -> Trajectory:
@@ -38,6 +40,13 @@ def test_units_and_who_wrote_it_are_in_the_folder(tmp_path):
     schema = pq.read_schema(tmp_path / "set" / "one" / "command.parquet")
     assert schema.field("x").metadata[b"unit"] == b"m"
     assert schema.field("t_ns").metadata[b"unit"] == b"ns"
+
+
+def test_the_side_of_the_encoders_is_written_and_read_again(tmp_path):
+    manifest = MANIFEST.replace("[model]", _BEYOND)
+    read = read_dataset(written(tmp_path / "told", manifest=manifest))
+    write_dataset(read, tmp_path / "again", {})
+    assert read_dataset(tmp_path / "again").source.encoders == "link"
 
 
 def test_a_folder_with_something_in_it_is_left_alone(tmp_path):

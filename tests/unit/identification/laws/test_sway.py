@@ -133,3 +133,24 @@ def test_a_link_behind_its_gear_begins_as_the_motion_before_left_it(
     at_rest = off(replace(later, begin=0.0))
     assert at_rest > 1e-3
     assert as_it_was < 0.3 * at_rest
+
+
+def test_a_spring_before_a_link_that_is_seen_begins_as_its_load_bends_it(tmp_path: Path) -> None:
+    """It is the motor's place and speed that the log lacks."""
+    seeing = replace(make_plant(tmp_path, "torque", has_gravity=False), encoders="link")
+    subject = make_subject(seeing)
+    rollouts = Rollouts(seeing, BENDS.structure(subject, "pan"), 2)
+
+    def loose(row: Row) -> None:
+        BENDS.enter(row, "pan", np.array([0.02]))
+
+    asked = recorded(lambda at: 3.0 * np.stack([np.sin(9 * at), 0 * at, 0 * at], axis=1), 3.0)
+    (whole,) = rollouts.run([(loose, asked)])
+    later = part(asked, whole.q)
+    rest = whole.q[-len(later.joints_at) :]
+
+    def off(recording: Recorded) -> float:
+        (found,) = rollouts.run([(loose, recording)])
+        return float(np.sqrt(np.mean((found.q - rest)[:30, 0] ** 2)))
+
+    assert off(later) < 0.2 * off(replace(later, begin=0.0))
