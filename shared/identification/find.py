@@ -15,6 +15,7 @@ from shared.identification.conclusion.gathered import evidence_of
 from shared.identification.dataset.caveats import in_words
 from shared.identification.dataset.types import Dataset, with_encoders, with_timestep
 from shared.identification.effect import Effect
+from shared.identification.fitting.base import SavedFits
 from shared.identification.fitting.problem import BLOCK, Span, Variant
 from shared.identification.fitting.saved import fits_of, load, save
 from shared.identification.fitting.timestep import coarse_step, shorter
@@ -78,11 +79,11 @@ def identify(
     run = _Run(seed, progress, clock, tuple(each for each in known if each.name not in without))
 
     def begun(
-        of: Dataset, folder: Path | None, aside: tuple[Span, ...] = (), like: Search | None = None
-    ) -> Search:
-        fits = None if folder is None else load(folder, of, seed)
-        if like is not None:
-            fits = fits_of(like)
+        of: Dataset, folder: Path | None, aside: tuple[Span, ...] = (),
+        fits: SavedFits | None = None,
+    ) -> Search:  # fmt: skip
+        if folder is not None:
+            fits = load(folder, of, seed)
         begins = begin(
             of, seed=seed, progress=progress, without=frozenset(without), catalogue=known,
             fits=fits, aside=aside, threads=threads,
@@ -113,12 +114,11 @@ def identify(
     if is_open(found) and may_be_beyond(found.problem.dataset):
         progress("base fit", 0.0, "again, as if encoders sat beyond the gears")
         beyond = with_encoders(found.problem.dataset, "link")
-        other = begun(beyond, None, found.problem.aside, found)
+        other = begun(beyond, None, found.problem.aside, fits_of(found))
         if is_seen_beyond(found, other):
             other, other_left = _searched(other, run)
             if not is_open(other) and is_of_gears(other):
                 found, left = other, other_left
-        clock.over("search")
     if not is_open(found):
         if not found.accepted:
             found.otherwise = otherwise(found, progress)

@@ -8,7 +8,7 @@ from shared.identification.arm.motion import smooth_motion
 from shared.identification.arm.smoothing import smooth_states
 from shared.identification.dataset.types import Float64, Trajectory
 from shared.sim.plant.plant import Control
-from shared.sim.plant.rollouts import Recorded
+from shared.sim.plant.replay import Recorded
 from shared.sim.plant.signals import Signal, sampled
 
 
@@ -34,14 +34,14 @@ off by 0.4 mrad, less than a reading, became 40 mrad within 6 s, at a tool where
 a tool is held, damping takes a wrong speed away; where such an arm gives, random torques leave four
 to five floors.
 """
+CUT = Cut(1.0, 0.05)
+"""Of any other arm."""
 _SLOW = 0.02
 """Of a joint's speed where it is fast: below that it stands."""
 _PLACES = 11
 """Begins of a part that are looked at."""
 _CLEAR = 0.7
 """Of what a state is taken from: a kink that far away does not matter."""
-CUT = Cut(1.0, 0.05)
-"""Of any other arm."""
 
 
 def width_of(period: float, cut: Cut) -> int:

@@ -11,7 +11,7 @@ from shared.config import toml
 from shared.config.location import line_of
 from shared.config.site import nearest
 from shared.errors import IdentificationError
-from shared.identification.dataset.types import Control, Encoders, Kind, Split
+from shared.identification.dataset.types import Control, EncoderSide, Kind, Split
 
 FILE: Final = "dataset.toml"
 SCHEMA: Final = 1
@@ -37,7 +37,7 @@ class ModelTable(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """A ``model.toml``, from the data set's folder; only of ``kind = "pr2"``."""
     tracked: str = ""
     """Site or body that the tracker is fixed to; only of ``kind = "mjcf"``."""
-    encoders: Encoders | None = None
+    encoders: EncoderSide | None = None
     """Which side of the joints' gears was logged; only of ``kind = "mjcf"``."""
 
     def __post_init__(self) -> None:

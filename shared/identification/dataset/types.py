@@ -16,7 +16,7 @@ Control = Literal["pose", "position", "torque"]
 """What a command is: a pose of the tool, a position per joint, or a torque per joint."""
 Split = Literal["train", "test"]
 Kind = Literal["pr2", "mjcf"]
-Encoders = Literal["motor", "link"]
+EncoderSide = Literal["motor", "link"]
 """Which side of a joint's gear its readings are of."""
 
 POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
@@ -36,7 +36,7 @@ class ModelSource:
     """A ``model.toml`` of a PR2; None is the nominal model."""
     tracked: str = ""
     """Site or body of an MJCF that the tracker is fixed to."""
-    encoders: Encoders | None = None
+    encoders: EncoderSide | None = None
     """Of an MJCF's joints; None where nobody said. A servo goes by the motor's side anyway."""
     timestep: float | None = None
     """Of the physics of an MJCF (s), if it is not to be the file's."""
@@ -121,7 +121,7 @@ class Dataset:
         return all(each.tracker is not None for each in self.trajectories)
 
 
-def with_encoders(dataset: Dataset, encoders: Encoders) -> Dataset:
+def with_encoders(dataset: Dataset, encoders: EncoderSide) -> Dataset:
     """Return the recordings as of encoders on one side of the joints' gears."""
     return replace(dataset, source=replace(dataset.source, encoders=encoders))
 

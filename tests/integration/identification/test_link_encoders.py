@@ -11,7 +11,7 @@ import pytest
 
 from shared.identification.dataset.types import (
     Dataset,
-    Encoders,
+    EncoderSide,
     Float64,
     ModelSource,
     Split,
@@ -83,7 +83,7 @@ def _recording(name: str, xml: str, rng: np.random.Generator) -> Trajectory:
 
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("encoders", [None, "link"])
-def test_a_soft_gear_before_the_encoder_is_named(tmp_path: Path, encoders: Encoders | None):
+def test_a_soft_gear_before_the_encoder_is_named(tmp_path: Path, encoders: EncoderSide | None):
     rng = np.random.default_rng(1)
     numbers = np.array([[0.15, 0.4, 0.3], [0.03, 0.1, 0.08]])
     path = tmp_path / "arm.xml"
