@@ -11,7 +11,8 @@ from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Effect
 from shared.sim.plant.plant import Plant, is_weightless, mjcf
-from shared.sim.plant.rollouts import Recorded, Reports, Rollouts
+from shared.sim.plant.replay import Recorded, Reports
+from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal
 

@@ -11,7 +11,7 @@ import numpy as np
 from shared.identification.arm.parts import CUT, CUTS, Cut, part_of, spans_of, states_of
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Dataset, Float64, Trajectory
-from shared.sim.plant.rollouts import Recorded
+from shared.sim.plant.replay import Recorded
 
 
 @dataclass(frozen=True)

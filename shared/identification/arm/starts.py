@@ -13,7 +13,8 @@ import numpy as np
 
 from shared.identification.arm.parts import Cut, part_of, spans_of, states_of
 from shared.identification.dataset.types import Float64, Trajectory
-from shared.sim.plant.rollouts import Recorded, Reports, Rollouts
+from shared.sim.plant.replay import Recorded, Reports
+from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import pose_error
 

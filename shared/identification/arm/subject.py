@@ -16,7 +16,8 @@ from shared.identification.arm.starts import Starts, starts_apart
 from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource, Trajectory
 from shared.sim.plant.inverse import inverse_dynamics
 from shared.sim.plant.plant import Control, Plant, is_weightless, mjcf, pr2, stepped
-from shared.sim.plant.rollouts import Recorded, Rollouts
+from shared.sim.plant.replay import Recorded
+from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.signals import Signal
 
 _SPARSE = 5

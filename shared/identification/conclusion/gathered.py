@@ -12,7 +12,7 @@ from shared.identification.conclusion.sides import Floors
 from shared.identification.dataset.types import Float64, Trajectory
 from shared.identification.fitting.problem import BLOCK, Problem, Variant
 from shared.sim.plant.kinematics import tool_poses
-from shared.sim.plant.rollouts import Reports
+from shared.sim.plant.replay import Reports
 from shared.sim.plant.signals import sampled
 
 

@@ -22,7 +22,8 @@ from shared.identification.fitting.problem import Problem, Variant
 from shared.identification.fitting.space import Space
 from shared.identification.noise.floor import Noise
 from shared.sim.plant.plant import pr2
-from shared.sim.plant.rollouts import Recorded, Rollouts
+from shared.sim.plant.replay import Recorded
+from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal
 

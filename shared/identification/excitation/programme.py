@@ -19,7 +19,7 @@ from shared.identification.excitation import motions
 from shared.identification.excitation.arm import Arm
 from shared.identification.excitation.limits import Limits, hurry, is_inside, strain
 from shared.sim.plant.inverse import inverse_dynamics
-from shared.sim.plant.rollouts import Recorded, Reports
+from shared.sim.plant.replay import Recorded, Reports
 from shared.sim.plant.signals import Signal, pose_error
 
 SHORTEST: Final = 40.0

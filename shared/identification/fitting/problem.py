@@ -19,7 +19,8 @@ from shared.identification.fitting.parameters import BaseParameter, enter_base
 from shared.identification.noise.floor import Noise
 from shared.sim.plant.inverse import model_of, reluctance
 from shared.sim.plant.plant import stepped
-from shared.sim.plant.rollouts import Entry, Reports, Rollouts
+from shared.sim.plant.replay import Reports
+from shared.sim.plant.rollouts import Entry, Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import pose_error, smoothed
 from shared.sim.plant.structure import Structure

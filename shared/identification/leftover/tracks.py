@@ -17,7 +17,7 @@ from shared.identification.noise.floor import block_means
 from shared.sim.plant.inverse import inverse_dynamics
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.missing import missing_torque
-from shared.sim.plant.rollouts import Reports
+from shared.sim.plant.replay import Reports
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import pose_error, sampled
 

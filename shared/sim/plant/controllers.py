@@ -16,7 +16,7 @@ import numpy as np
 from shared.sim.arm import Float64
 from shared.sim.plant.plant import Plant
 from shared.sim.plant.row import Row
-from shared.sim.plant.structure import compiled, series_joints
+from shared.sim.plant.structure import compiled, link_sums
 
 _GAINS = ("actuator_gainprm", "actuator_biasprm")
 _LIMITS = "jnt_actfrcrange"
@@ -52,13 +52,7 @@ class Controllers:
         self._own = [int(joint.id) for joint in own]
         self._own_qpos = np.array([int(joint.qposadr[0]) for joint in own])
         self._own_dofs = np.array([int(joint.dofadr[0]) for joint in own])
-        # What is summed up for each link, float64[Q, J] and float64[V, J] of ones and zeros.
-        self._turns = np.zeros((model.nq, len(joints)))
-        self._rates = np.zeros((model.nv, len(joints)))
-        for index, label in enumerate(plant.labels):
-            of_link = series_joints(plant, model, label)
-            self._turns[model.jnt_qposadr[of_link], index] = 1.0
-            self._rates[model.jnt_dofadr[of_link], index] = 1.0
+        self._links = link_sums(plant, model)
         self.rows = np.empty(0, np.int64)
         """int64[K], the arms in their batch."""
         self._scale = self._offset = np.empty((0, len(plant.joints)))
@@ -98,8 +92,8 @@ class Controllers:
         count = len(self.rows)
         said = self._scale * qpos[:, self._own_qpos] + self._offset
         rate_said = self._scale * qvel[:, self._own_dofs]
-        self._q[self._at_q] = np.concatenate([said, qpos @ self._turns])
-        self._qd[self._at_qd] = np.concatenate([rate_said, qvel @ self._rates])
+        self._q[self._at_q] = np.concatenate([said, qpos @ self._links])
+        self._qd[self._at_qd] = np.concatenate([rate_said, qvel @ self._links])
         self._command[: 2 * count] = np.concatenate([command, command])
         self._batch.forward(self._ids)
         torques = self._torques[self._at_qd]

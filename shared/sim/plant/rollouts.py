@@ -2,7 +2,6 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
 
 import mujoco
 import mujoco.batch
@@ -12,66 +11,18 @@ from shared.sim.arm import Float64
 from shared.sim.model import silence
 from shared.sim.plant.centred import centre
 from shared.sim.plant.controllers import Controllers
-from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.laws import Active, Rubbing, frictions_of, torques_of
 from shared.sim.plant.plant import TOOL, Plant
-from shared.sim.plant.row import JointsReport, Row, TrackerReport
-from shared.sim.plant.signals import Signal, filtered, sampled, sampled_poses
+from shared.sim.plant.replay import Motion, Recorded, Reports, reports_of
+from shared.sim.plant.row import Row
+from shared.sim.plant.signals import filtered
 from shared.sim.plant.step import Moment, Step, rows_of
-from shared.sim.plant.structure import Structure, compiled, series_joints
+from shared.sim.plant.structure import Structure, compiled, link_sums
 
 _CHUNK = 250
 """Steps that a batch takes between two looks at what it recorded."""
 _STICKS = (0.999, 0.9999)
 """Impedance of dry friction, at least: MuJoCo's 0.9 lets a stuck joint creep 100 times as fast."""
-
-
-@dataclass(frozen=True)
-class Recorded:
-    """What an arm is to replay, and when it is to report."""
-
-    initial_q: Float64
-    """float64[J]."""
-    initial_qd: Float64
-    """float64[J]."""
-    command: Signal
-    logged_q: Signal
-    joints_at: Float64
-    """float64[T] (s)."""
-    tracker_at: Float64 | None
-    """float64[K] on the tracker's clock (s)."""
-    trajectory: str = ""
-    """Name of the recording that it is, or is a part of."""
-    begin: float = 0.0
-    """How far into the recording time 0 is (s)."""
-    earlier: tuple[str, ...] = ()
-    """Names of the recordings made before it."""
-    logged_tracker: Signal | None = None
-    """float64[C, 7] poses, of the whole recording."""
-
-
-@dataclass(frozen=True)
-class Reports:
-    """What one arm would have logged."""
-
-    q: Float64
-    """float64[T, J]; NaN from where the physics diverged."""
-    tracker: Float64 | None
-    """float64[K, 7]."""
-
-
-@dataclass(frozen=True)
-class _Motion:
-    """How one arm moved."""
-
-    times: Float64
-    """float64[S + 1], ends of steps and their begin (s)."""
-    q: Float64
-    """float64[S + 1, J]."""
-    tool: Float64 | None
-    """float64[S, 7], before each step."""
-    is_bad: bool
-    """Whether the physics diverged."""
 
 
 Entry = Callable[[Row], None]
@@ -101,7 +52,7 @@ class Rollouts:
         self._qpos = np.array([int(joint.qposadr[0]) for joint in self._joints])
         self._dofs = np.array([int(joint.dofadr[0]) for joint in self._joints])
         self._logged, self._moved = rows_of(self._qpos), rows_of(self._dofs)
-        self._beyond = _beyond(plant, self.model)
+        self._links = link_sums(plant, self.model) if plant.encoders == "link" else None
         self._columns = np.concatenate(
             [_controls(self.model, int(self.model.actuator(name).id)) for name in plant.actuators]
         )
@@ -136,10 +87,10 @@ class Rollouts:
             moved = self._run([(rows[group[0]], work[group[0]][1]) for group in picked])
             for group, motion in zip(picked, moved, strict=True):
                 for index in group:
-                    found[index] = self._reports(rows[index], work[index][1], motion)
+                    found[index] = reports_of(rows[index], work[index][1], motion)
         return [found[index] for index in range(len(work))]
 
-    def _run(self, work: Sequence[tuple[Row, Recorded]]) -> "list[_Motion]":
+    def _run(self, work: Sequence[tuple[Row, Recorded]]) -> list[Motion]:
         rows = [self._commanded(row) for row, _ in work]
         for index, row in enumerate(rows):
             row.index = index
@@ -193,7 +144,7 @@ class Rollouts:
         times: Float64 = timestep * np.arange(steps + 1, dtype=np.float64)
         is_bad = self._batch.warning[ids].reshape(len(ids), -1).any(axis=1)
         return [
-            _Motion(
+            Motion(
                 times,
                 q[row.index],
                 None if tool is None else tool[row.index, :-1],
@@ -255,8 +206,7 @@ class Rollouts:
 
     def _read(self, qpos: Float64) -> Float64:
         """Return float64[..., J], what right encoders say in a state: float64[..., Q]."""
-        q = qpos[..., self._logged]
-        return q if self._beyond is None else q + qpos @ self._beyond
+        return qpos[..., self._logged] if self._links is None else qpos @ self._links
 
     def _settle(self, rows: Sequence[Row]) -> None:
         """Put added joints where their loads leave them; twice, as that changes the loads.
@@ -271,14 +221,14 @@ class Rollouts:
                     joint = self.model.joint(name)
                     load = float(bias[row.index, joint.dofadr[0]])
                     qpos[row.index, joint.qposadr[0]] = rests(load)
-                if self._beyond is not None:
-                    qpos[row.index, self._qpos] = row.initial_q - qpos[row.index] @ self._beyond
+                if self._links is not None:
+                    qpos[row.index, self._qpos] += row.initial_q - qpos[row.index] @ self._links
         qvel = self._batch.bind("qvel")
         for row in rows:
             for name, speed in row.speeds.items():
                 qvel[row.index, self.model.joint(name).dofadr[0]] = speed
-            if self._beyond is not None:  # all joints are hinges and slides: qvel is as qpos
-                qvel[row.index, self._dofs] = row.initial_qd - qvel[row.index] @ self._beyond
+            if self._links is not None:
+                qvel[row.index, self._dofs] += row.initial_qd - qvel[row.index] @ self._links
 
     def _open(self, ids: np.ndarray, ctrl: Float64) -> tuple[Float64, Float64]:
         found = self._batch.rollout(
@@ -351,55 +301,11 @@ class Rollouts:
             rubs[arms, moved] = rubbed
         return q, tool
 
-    def _reports(self, row: Row, recorded: Recorded, motion: "_Motion") -> Reports:
-        q = sampled(motion.times, motion.q, recorded.joints_at)
-        joints = JointsReport(recorded.joints_at, q)
-        for change in row.joints_reports:
-            change(joints)
-        if motion.is_bad:
-            joints.q = np.full_like(joints.q, np.nan)
-        if recorded.tracker_at is None or motion.tool is None:
-            return Reports(joints.q, None)
-        at = recorded.tracker_at
-        at = at if row.tracker_time is None else row.tracker_time(at)
-        seen = self._seen(row, motion.times[:-1], motion.tool, at)
-        report = TrackerReport(recorded.tracker_at, seen)
-        for change in row.tracker_reports:
-            change(report)
-        if motion.is_bad:
-            report.pose = np.full_like(report.pose, np.nan)
-        return Reports(joints.q, report.pose)
-
-    def _seen(self, row: Row, times: Float64, tool: Float64, at: Float64) -> Float64:
-        """Return float64[K, 7]; of instants that were not replayed, from the joints' log."""
-        poses = sampled_poses(times, tool, at)
-        log = row.logged_q
-        is_left = ((at < times[0]) | (at > times[-1])) & (at >= log.at[0]) & (at <= log.at[-1])
-        if is_left.any():
-            q = sampled(log.at, log.values, at[is_left])
-            poses[is_left] = tool_poses(self.plant, self.model, q)
-        return poses
-
 
 def _controls(model: mujoco.MjModel, actuator: int) -> np.ndarray:
     """Return which of the model's controls are an actuator's."""
     first = int(model.actuator_ctrladr[actuator])
     return np.arange(first, first + int(model.actuator_ctrlnum[actuator]))
-
-
-def _beyond(plant: Plant, model: mujoco.MjModel) -> Float64 | None:
-    """Return float64[Q, J]: whose positions, of added joints, are in what an encoder says.
-
-    None where that is what its motor does alone.
-    """
-    if plant.encoders == "motor":
-        return None
-    out = np.zeros((model.nq, len(plant.labels)))
-    for column, label in enumerate(plant.labels):
-        for joint in series_joints(plant, model, label):
-            if model.joint(joint).name != plant.mj_joint(label):
-                out[model.jnt_qposadr[joint], column] = 1.0
-    return out if out.any() else None
 
 
 def _motion_of(row: Row, recorded: Recorded) -> Hashable:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from shared.sim.arm import Float64
 from shared.sim.plant.plant import Plant
 
 STIFF = 1e9
@@ -138,6 +139,21 @@ def series_joints(plant: Plant, model: mujoco.MjModel, label: str) -> list[int]:
     first, added = plant.mj_joint(label), series_name(plant, label, "")
     names = [model.joint(index).name for index in range(model.njnt)]
     return [index for index, name in enumerate(names) if name == first or name.startswith(added)]
+
+
+def link_sums(plant: Plant, model: mujoco.MjModel) -> Float64:
+    """Return float64[Q, J] of ones and zeros: positions, or speeds, times it are the links'.
+
+    All joints are hinges and slides, so that both are in the same places of a state.
+
+    Args:
+        plant: the arm.
+        model: of it, with whatever was added.
+    """
+    out = np.zeros((model.nq, len(plant.labels)))
+    for index, label in enumerate(plant.labels):
+        out[model.jnt_qposadr[series_joints(plant, model, label)], index] = 1.0
+    return out
 
 
 def compiled(plant: Plant, structure: Structure) -> mujoco.MjModel:

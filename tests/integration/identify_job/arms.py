@@ -12,7 +12,8 @@ from shared.identification.verdict import BaseValue, Cause, HeldOut, Interval, V
 from shared.sim.config import SimConfig
 from shared.sim.model import FencingModel
 from shared.sim.plant.plant import pr2
-from shared.sim.plant.rollouts import Recorded, Rollouts
+from shared.sim.plant.replay import Recorded
+from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.signals import Signal
 
 SECONDS = 1.5

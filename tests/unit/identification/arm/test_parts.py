@@ -13,7 +13,8 @@ from shared.identification.fitting.problem import BLOCK
 from shared.identification.noise.floor import repeat_differences
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.plant import pr2
-from shared.sim.plant.rollouts import Recorded, Rollouts
+from shared.sim.plant.replay import Recorded
+from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal
 

@@ -14,7 +14,8 @@ from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSou
 from shared.identification.effect import Candidate, Effect
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.plant import mjcf, pr2
-from shared.sim.plant.rollouts import Recorded, Reports, Rollouts
+from shared.sim.plant.replay import Recorded, Reports
+from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal
 from shared.sim.plant.structure import Structure

@@ -8,7 +8,7 @@ from shared.identification.catalogue.clock_skew import EFFECT as SKEW
 from shared.identification.catalogue.tracker_latency import EFFECT as LATENCY
 from shared.identification.dataset.types import Float64
 from shared.sim.plant.kinematics import tool_poses
-from shared.sim.plant.rollouts import Reports
+from shared.sim.plant.replay import Reports
 from shared.sim.plant.signals import Signal, sampled
 from tests.arms import make_plant, make_subject, recorded, replay
 

@@ -8,7 +8,8 @@ from shared.identification.catalogue.dropped_packets import EFFECT as DROPPED
 from shared.identification.catalogue.sample_and_hold import EFFECT as HELD
 from shared.identification.dataset.types import Float64, Trajectory
 from shared.identification.laws.outages import lost_at, without
-from shared.sim.plant.rollouts import Recorded, Rollouts
+from shared.sim.plant.replay import Recorded
+from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal
 from tests.arms import make_plant, make_subject, recorded, replay

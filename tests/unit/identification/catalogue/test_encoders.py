@@ -8,7 +8,8 @@ from shared.identification.dataset.types import Float64
 from shared.identification.effect import Effect
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.plant import pr2
-from shared.sim.plant.rollouts import Reports, Rollouts
+from shared.sim.plant.replay import Reports
+from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.row import Row
 from tests.arms import make_plant, make_subject, recorded, replay, still
 

@@ -9,7 +9,7 @@ from shared.identification.dataset.types import Float64
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.plant import pr2
 from shared.sim.plant.poses import conjugate, frame, product, rotated, seen_from
-from shared.sim.plant.rollouts import Reports
+from shared.sim.plant.replay import Reports
 from tests.arms import make_plant, make_subject, recorded, replay
 
 REST = (-0.85, 0.30, -1.50, -1.45, 0.50, -1.00, 1.46)

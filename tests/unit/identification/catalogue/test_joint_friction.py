@@ -17,7 +17,7 @@ from shared.identification.catalogue.viscous_friction import EFFECT as VISCOUS
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Effect
 from shared.sim.plant.plant import mjcf
-from shared.sim.plant.rollouts import Reports
+from shared.sim.plant.replay import Reports
 from tests.arms import make_plant, make_subject, recorded, replay, still
 
 _TURNTABLE = """<mujoco><compiler angle="radian"/><option timestep="0.002" gravity="0 0 0"/>

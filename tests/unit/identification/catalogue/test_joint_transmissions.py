@@ -13,7 +13,7 @@ from shared.identification.dataset.types import Float64
 from shared.identification.effect import Effect
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.plant import pr2
-from shared.sim.plant.rollouts import Recorded, Reports
+from shared.sim.plant.replay import Recorded, Reports
 from shared.sim.plant.signals import Signal
 from tests.arms import make_plant, make_subject, recorded, replay, still
 

@@ -9,7 +9,7 @@ from shared.identification.catalogue.tracker_slip import EFFECT
 from shared.identification.dataset.types import Float64, Trajectory
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.poses import conjugate, rotated
-from shared.sim.plant.rollouts import Reports
+from shared.sim.plant.replay import Reports
 from tests.arms import make_plant, make_subject, recorded, replay
 
 WAY = [0.004, -0.003, 0.0]

@@ -12,7 +12,8 @@ from shared.identification.catalogue.joint_elasticity import EFFECT as BENDS
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Effect
 from shared.sim.plant.plant import stepped
-from shared.sim.plant.rollouts import Recorded, Rollouts
+from shared.sim.plant.replay import Recorded
+from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal, pose_error
 from tests.arms import make_plant, make_subject, recorded

@@ -5,7 +5,8 @@ import pytest
 
 from shared.identification.arm.subject import recorded_of, subject_of
 from shared.identification.catalogue.base_compliance import EFFECT as GIVES
-from shared.sim.plant.rollouts import Entry, Recorded, Reports, Rollouts
+from shared.sim.plant.replay import Recorded, Reports
+from shared.sim.plant.rollouts import Entry, Rollouts
 from shared.sim.plant.row import JointsReport, Row
 from tests.measured import measure, nothing
 

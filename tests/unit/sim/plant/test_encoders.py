@@ -8,7 +8,8 @@ from shared.sim.arm import Float64
 from shared.sim.plant.encoders import misread
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.plant import pr2
-from shared.sim.plant.rollouts import Recorded, Rollouts
+from shared.sim.plant.replay import Recorded
+from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal
 from shared.sim.plant.structure import compiled
