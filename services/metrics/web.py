@@ -11,6 +11,7 @@ from collections.abc import Callable, Coroutine
 from typing import Any, NamedTuple, TypeVar
 
 from shared.errors import ConfigError
+from shared.sockets import stop_accepting
 
 MAX_CONNECTIONS = 16
 MAX_REQUEST = 16 * 1024
@@ -85,6 +86,7 @@ class Web:
     # From here on: the web's thread.
 
     async def _end(self) -> None:
+        await stop_accepting(self._server.sockets)
         self._server.close()
         tasks = asyncio.all_tasks() - {asyncio.current_task()}
         for task in tasks:

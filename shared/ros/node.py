@@ -29,6 +29,7 @@ import structlog
 from shared.clock import Clock, SystemClock
 from shared.errors import MessageError
 from shared.ros.errors import RosError
+from shared.ros.listening import Listener
 from shared.ros.loop import SocketLoop, own_address, received
 from shared.ros.publishing import Publication
 from shared.ros.registration import Registration, texts_of
@@ -88,9 +89,7 @@ class Node:
         self._publications: dict[str, Publication] = {}
         self._subscriptions: dict[str, Subscription] = {}
         self._services: dict[str, Service] = {}
-        self._connections = 0
-        self.refused = 0
-        """Connections that were no ROS node's."""
+        self._refused = 0
         self._is_closed = False
         self._api = XmlRpcServer(self._methods())
         self._loop = SocketLoop(name)
@@ -185,7 +184,7 @@ class Node:
             served = Service(service, type_name, handler, node=self.name, largest=self._largest)
             self._services[service] = served
         self._registration.add_service(
-            self._loop.events, service, f"rosrpc://{self.host}:{self._tcp_port}"
+            self._loop.events, service, f"rosrpc://{self.host}:{self._listener.port}"
         )
         return served
 
@@ -218,6 +217,11 @@ class Node:
     def problem(self) -> str:
         """Return what is wrong with the master, or between it and this node; empty if nothing."""
         return self._registration.problem
+
+    @property
+    def refused(self) -> int:
+        """Return how many connections were no ROS node's, or one too many."""
+        return self._refused + self._listener.refused
 
     @property
     def is_shut_down(self) -> bool:
@@ -260,42 +264,20 @@ class Node:
                 self.host, 0, family=socket.AF_INET, type=socket.SOCK_STREAM
             )
             address = str(found[0][4][0])
-            self._listening = socket.create_server((address, 0), backlog=64)
-            self._listening.setblocking(False)
+            self._listener = Listener(address, self._greet, most=_MOST_CONNECTIONS, loop=self._loop)
             port = await self._api.open(address)
         except OSError as error:
             raise RosError(
                 f"cannot listen on {self.host}: {error.strerror or error}; "
                 "host must be a name or address of this machine"
             ) from error
-        self._tcp_port = int(self._listening.getsockname()[1])
-        self._loop.begin(self._accept())
         return port
 
     async def _shut(self) -> None:
         for subscription in self._subscriptions.values():
             subscription.leave()
-        self._api.close()
-        self._listening.close()
-
-    async def _accept(self) -> None:
-        loop = asyncio.get_running_loop()
-        while True:
-            try:
-                sock, _ = await loop.sock_accept(self._listening)
-            except OSError as error:
-                if self._is_closed:
-                    return
-                log.warning("ros_accept_failed", error=str(error))  # out of descriptors
-                await asyncio.sleep(0.1)
-                continue
-            sock.setblocking(False)
-            if self._connections >= _MOST_CONNECTIONS:
-                self.refused += 1
-                sock.close()
-                continue
-            self._connections += 1
-            self._loop.begin(self._greet(sock))
+        self._listener.close()
+        await self._api.close()
 
     async def _greet(self, sock: socket.socket) -> None:
         """Serve one connection: a subscriber's or a service client's."""
@@ -313,7 +295,7 @@ class Node:
                     else server.refusal(asked)
                 )
                 if refusal:
-                    self.refused += 1
+                    self._refused += 1
                     log.warning("ros_connection_refused", why=refusal, by=asked.get("callerid"))
                     loop = asyncio.get_running_loop()
                     await loop.sock_sendall(sock, header({"error": refusal}))
@@ -321,13 +303,10 @@ class Node:
             assert server is not None
             await server.serve(sock, asked)
         except (MessageError, TimeoutError) as error:
-            self.refused += 1
+            self._refused += 1
             log.debug("ros_connection_refused", why=str(error))
         except OSError:
             pass  # the other end went away
-        finally:
-            self._connections -= 1
-            sock.close()
 
     def _methods(self) -> dict[str, Method]:
         """Return the slave API, which the master and other nodes call; on the loop's thread."""
@@ -357,7 +336,7 @@ class Node:
             return [-1, f"{topic} is not published here", []]
         if not any(protocol[:1] == ["TCPROS"] for protocol in protocols):
             return [0, "only TCPROS is spoken here", []]
-        return [1, "", ["TCPROS", self.host, self._tcp_port]]
+        return [1, "", ["TCPROS", self.host, self._listener.port]]
 
     def _be_shut_down(self, caller: str, why: str = "") -> list[Any]:
         log.error("ros_node_shut_down", by=caller, why=why)

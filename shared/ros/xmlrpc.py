@@ -11,6 +11,7 @@ import structlog
 
 from shared.errors import MessageError
 from shared.ros.errors import RosError
+from shared.sockets import stop_accepting
 
 LARGEST: Final = 4 << 20
 """Bytes of a request or a reply; the state of a PR2's whole system takes 0.2 MB."""
@@ -140,10 +141,11 @@ class XmlRpcServer:
         )
         return cast("int", self._server.sockets[0].getsockname()[1])
 
-    def close(self) -> None:
+    async def close(self) -> None:
         """Stop listening, and let go of those who are just asking."""
         self._is_closed = True
         if self._server is not None:
+            await stop_accepting(self._server.sockets)
             self._server.close()
         for writer in self._serving:
             writer.transport.abort()

@@ -23,6 +23,7 @@ from websockets.http11 import Request, Response
 
 from shared.errors import ConfigError
 from shared.runtime.talk import Tally
+from shared.sockets import stop_accepting
 
 START_SECONDS = 10.0
 CLOSE_SECONDS = 2.0
@@ -139,6 +140,7 @@ class WebServer:
         )  # fmt: skip
 
     async def _end(self) -> None:
+        await stop_accepting(self._server.sockets)
         self._server.close()
         await self._server.wait_closed()
 

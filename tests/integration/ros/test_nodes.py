@@ -193,7 +193,7 @@ class Impostor:
         # The slave API of a real node, the TCPROS server of our own.
         self._server = socket.create_server(("127.0.0.1", 0))
         port = self._server.getsockname()[1]
-        node._tcp_port = port  # pyright: ignore[reportPrivateUsage]
+        node._listener.port = port  # pyright: ignore[reportPrivateUsage]
         self._md5 = md5 or types.md5_of(TEXT)
         self._parts = parts
         self._topic = topic
