@@ -4,6 +4,7 @@ Under a controller that holds the arm to its command a whole recording is one pa
 short parts say something, see :data:`shared.identification.arm.parts.CUTS`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +13,9 @@ from shared.identification.arm.parts import CUT, CUTS, Cut, part_of, spans_of, s
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Dataset, Float64, Trajectory
 from shared.sim.plant.replay import Recorded
+
+ENOUGH_SECONDS = 15.0
+"""Of motion, about, that show well enough where to look closer (s)."""
 
 
 @dataclass(frozen=True)
@@ -72,3 +76,27 @@ def _segment(
     recorded, joints, tracker = part_of(of, begin, end, state)
     poses = None if of.tracker is None or not len(tracker) else of.tracker[tracker]
     return Segment(index, recorded, of.q[joints], poses)
+
+
+def thinned(segments: Sequence[Segment], of: Sequence[int]) -> tuple[int, ...]:
+    """Return some of each recording's segments: half of all or, of many, what shows enough.
+
+    They are one of so many, of the first recording from its first segment on, of the next from its
+    second: what recurs at the same times of all recordings, a log's gaps for one, would else be in
+    all of them or in none.
+
+    Args:
+        segments: all that there are.
+        of: indices of those of which some are wanted.
+    """
+    every = max(2, round(seconds_of(segments, of) / ENOUGH_SECONDS))
+    order: dict[int, list[int]] = {}
+    for index in of:
+        order.setdefault(segments[index].trajectory, []).append(index)
+    kept = {one for turn, own in enumerate(order.values()) for one in own[turn % every :: every]}
+    return tuple(index for index in of if index in kept)
+
+
+def seconds_of(segments: Sequence[Segment], of: Sequence[int]) -> float:
+    """Return how long some segments are together (s)."""
+    return float(sum(segments[index].recorded.joints_at[-1] for index in of))

@@ -8,6 +8,7 @@ import numpy as np
 from shared.identification.dataset.types import Float64
 from shared.identification.fitting.cmaes import minimize
 from shared.identification.fitting.fit import ENOUGH, Fit, Start, go_down, polish
+from shared.identification.fitting.long import polish_by_parts, polish_on_some
 from shared.identification.fitting.space import Space
 from shared.identification.noise.floor import Noise
 from shared.sim.plant.plant import Control
@@ -122,7 +123,7 @@ def fit_without(space: Space, done: BaseFits, doubted: Sequence[int]) -> BaseFit
     """
     begun, best = (np.delete(fit.z, doubted) for fit in (done.parts, done.whole))
     parts = _on_parts(space)
-    near = polish(parts, begun, parts.problem.of("train"), 6)
+    near = polish_by_parts(parts, begun, parts.problem.of("train"), 6)
     is_same = parts.problem is space.problem
     whole = near if is_same else polish(space, best, space.problem.of("train"), 6)
     nominal = _start_without(done.nominal, doubted)
@@ -140,7 +141,7 @@ def fit_with(space: Space, done: BaseFits, start: Float64) -> BaseFits:
     parts, origin = _on_parts(space), np.zeros(space.size)
     pieces = parts.problem.of("train")
     nominal = Start(origin, parts.jacobian(origin, pieces, is_rough=True)[1])
-    near = polish(parts, np.r_[done.parts.z, start], pieces, 6)
+    near = polish_by_parts(parts, np.r_[done.parts.z, start], pieces, 6)
     is_same = parts.problem is space.problem
     begun = np.r_[done.whole.z, start]
     whole = near if is_same else polish(space, begun, space.problem.of("train"), 6)
@@ -157,18 +158,25 @@ def _start_without(start: Start, gone: Sequence[int]) -> Start:
 def _fitted(space: Space, searched: Float64) -> BaseFits:
     """Return the better one of two fits: from nominal by way of short parts, and directly."""
     problem = space.problem
-    segments = problem.of("train")
     parts, origin = _on_parts(space), np.zeros(space.size)
     pieces = parts.problem.of("train")
     at_nominal = Fit.at(parts, origin, pieces, is_rough=True)
-    begun = polish(parts, at_nominal, pieces, 6)
-    is_same = parts.problem is problem
-    first = begun if is_same else polish(space, begun.z, segments, 6)
-    fits = [first, _from_elsewhere(space, searched, first, segments)]
+    near, some = polish_on_some(at_nominal, pieces, 6)
+    begun = near if some == pieces else polish(parts, near.z, pieces, 6)
+    if parts.problem is problem:
+        fits, other = [begun], _from_elsewhere(space, searched, near, some)
+        agree = max(near.cost, other.cost) <= _as_good(min(near.cost, other.cost))
+        if other.cost < near.cost:
+            fits.append(other if some == pieces else polish(space, other.z, pieces, 6))
+    else:
+        segments = problem.of("train")
+        first = polish(space, begun.z, segments, 6)
+        fits = [first, _from_elsewhere(space, searched, first, segments)]
+        agree = max(fit.cost for fit in fits) <= _as_good(min(fit.cost for fit in fits))
     best = min(fits, key=lambda fit: fit.cost)
-    agree = max(fit.cost for fit in fits) <= _as_good(best.cost)
     nominal = Start(origin, at_nominal.jacobian)
-    return BaseFits(nominal, best if is_same else begun, replace(best, starts_agree=agree))
+    best_on_parts = best if parts.problem is problem else begun
+    return BaseFits(nominal, best_on_parts, replace(best, starts_agree=agree))
 
 
 def _from_elsewhere(space: Space, start: Float64, first: Fit, segments: tuple[int, ...]) -> Fit:

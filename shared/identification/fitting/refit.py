@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from shared.identification.arm.segments import thinned
 from shared.identification.dataset.types import Float64
 from shared.identification.fitting.fit import Fit, Start, damped, go_down, is_nearly, promised
 from shared.identification.fitting.space import Space
@@ -25,8 +26,6 @@ _MENDING = (1e-4, 1e-2, 1.0)
 _PARTS = (1.0, 0.5, 0.25)
 """Of the way to where the screen expects the best fit, for a start."""
 _ENOUGH = 0.01
-_EVERY = 2
-"""One in so many parts is enough for a rough look."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ def refit(
     problem = fit.space.problem
     quantities = screened.candidate.effect.quantities(problem.subject, screened.candidate.place)
     is_local = not all(quantity.is_smooth for quantity in quantities)
-    picked = segments if is_local else segments[::_EVERY]
+    picked = segments if is_local else thinned(problem.segments, segments)
     rows = problem.rows_of(segments, picked)
     extra = space.size - fit.space.size
     way: Float64 = np.concatenate([screened.shift, screened.start])

@@ -12,18 +12,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shared.identification.arm.segments import thinned
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate, Effect
 from shared.identification.fitting.fit import Fit
 from shared.identification.fitting.linear import bounded, least_squares
+from shared.identification.fitting.problem import Problem
 from shared.identification.fitting.turns import LATE
 from shared.identification.search.looks import Columns, Look, Looked, columns_of, looks_of
 
-_EVERY = 2
-"""One in so many parts shows what acts all the time well enough to be looked at closer, or not."""
 _MANY = 8
-"""Parts, at least, of which some are left out."""
+"""Parts, at least, of which every second one shows what acts all the time well enough to be looked
+at closer, or not."""
 _CLOSER = 16
 """Candidates that are looked at in all parts after that, where it is not plain."""
 _PLAIN = 10.0
@@ -99,7 +100,7 @@ def screen(
         seen: is filled at the first look. At a later one, where hardly more than noise is left,
             candidates that by it would explain least are not looked at, nor returned.
     """
-    picked = _picked(segments)
+    picked = _picked(fit.space.problem, segments)
     rows = shown_rows(fit, segments)
     subject = fit.space.problem.subject
     lasting = [each for each in candidates if each.recording is None]
@@ -174,13 +175,14 @@ def _closer(
     return [each.screened for each in at_best(fit, both, rows)]
 
 
-def _picked(segments: tuple[int, ...]) -> tuple[int, ...]:
-    return segments[::_EVERY] if len(segments) >= _MANY else segments
+def _picked(problem: Problem, segments: tuple[int, ...]) -> tuple[int, ...]:
+    return thinned(problem.segments, segments) if len(segments) >= _MANY else segments
 
 
 def shown_rows(fit: Fit, segments: tuple[int, ...]) -> NDArray[np.bool_]:
     """Return which rows of a fit's residual signatures are of."""
-    return fit.space.problem.rows_of(segments, _picked(segments))
+    problem = fit.space.problem
+    return problem.rows_of(segments, _picked(problem, segments))
 
 
 def of_recording(fit: Fit, name: str | None, segments: tuple[int, ...]) -> tuple[int, ...]:

@@ -1,12 +1,14 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from shared.identification.arm.segments import segments_of
+from shared.identification.arm.segments import segments_of, thinned
 from shared.identification.arm.subject import recorded_of, subject_of
 from shared.identification.dataset.types import Dataset, ModelSource, Trajectory
 from shared.sim.plant.rollouts import Rollouts
+from tests.measured import measure
 
 _PENDULUM = """<mujoco><option timestep="{timestep}"/><worldbody><body name="link">
 <joint name="hinge" axis="0 1 0"/><inertial pos="0 0 -0.3" mass="1" diaginertia="0.01 0.01 0.01"/>
@@ -75,3 +77,20 @@ def test_a_part_is_put_off_while_a_joint_turns_round(tmp_path: Path):
         assert each.recorded.initial_q[0] == pytest.approx(
             np.interp(each.recorded.begin, at, q[:, 0]), abs=1e-6
         )
+
+
+@pytest.mark.parametrize(("seconds", "count", "every"), [(4.4, 4, 2), (3.4, 3, 2), (15.4, 15, 3)])
+def test_some_parts_are_of_other_times_in_the_next_recording(
+    tmp_path: Path, seconds: float, count: int, every: int
+):
+    measured = measure(tmp_path, np.random.default_rng(0), seconds=seconds)
+    three = tuple(replace(each, split="train", repeats="") for each in measured.trajectories)
+    dataset = replace(measured, trajectories=three)
+    segments = segments_of(dataset, subject_of(dataset), 1.0)
+    assert len(segments) == 3 * count
+    each = [range(index * count, (index + 1) * count) for index in range(3)]
+    some = thinned(segments, range(3 * count))
+    expected = [own[turn % every :: every] for turn, own in enumerate(each)]
+    assert some == tuple(index for own in expected for index in own)
+    assert thinned(segments, each[1]) == tuple(each[1][::2])
+    assert thinned(segments, (0,)) == (0,)
