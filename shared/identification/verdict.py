@@ -67,7 +67,7 @@ class Unexplained(_Part, frozen=True, kw_only=True):
     phase: str
     """In words: ``once``, ``after reversals`` (``of the load``), ``while fast``, ``while slow``,
     ``while loaded``, ``near a posture``, ``grows with time``, ``from a time on``, ``throughout``,
-    ``at times``."""
+    ``at times``, ``again and again`` (like pushes, too often at one joint to be any)."""
     size: float
     """Root mean square there."""
     unit: str

@@ -4,6 +4,7 @@ import math
 
 import msgspec
 
+from shared.identification.leftover.phases import AGAIN
 from shared.identification.search.searched import NEARLY_NOISE
 from shared.identification.verdict import Cause, HeldOut, Interval, Tie, Unexplained, Word
 from shared.telemetry.wording import listing, scaled
@@ -100,17 +101,25 @@ def _by_all(held_out: HeldOut) -> str:
 
 
 def _also_pushed(left: tuple[Unexplained, ...]) -> str:
-    """Return what came from outside, the largest first; a sentence after a blank, or nothing."""
-    pushes = [each for each in left if each.is_external]
-    if not pushes:
-        return ""
-    first = pushes[0]
-    count = "once," if len(pushes) == 1 else f"{len(pushes)} times, most"
-    size = "" if first.torque is None else f" with {first.torque:.3g} {first.torque_unit}"
-    return (
-        f" Something outside pushed {first.where} {count} from "
-        f"{first.begin:.2f} to {first.end:.2f} s of {first.trajectory}{size}."
-    )
+    """Return what came from outside, or looks like it; sentences, each after a blank, or nothing."""
+    told = ""
+    if pushes := [each for each in left if each.is_external]:
+        first = pushes[0]
+        count = "once," if len(pushes) == 1 else f"{len(pushes)} times, most"
+        told = f" Something outside pushed {first.where} {count} {_most(first)}."
+    for where in dict.fromkeys(each.where for each in left if each.phase == AGAIN):
+        own = [each for each in left if each.where == where and each.phase == AGAIN]
+        told += (
+            f" At {where} a torque is missing again and again ({len(own)} times, most "
+            f"{_most(own[0])}): too often to be pushes, so a law that the catalogue lacks."
+        )
+    return told
+
+
+def _most(push: Unexplained) -> str:
+    """Return when a push was and how hard it pushed."""
+    size = "" if push.torque is None else f" with {push.torque:.3g} {push.torque_unit}"
+    return f"from {push.begin:.2f} to {push.end:.2f} s of {push.trajectory}{size}"
 
 
 def label(cause: Cause) -> str:

@@ -14,6 +14,7 @@ from shared.identification.arm.places import moving, place_of
 from shared.identification.dataset.types import Float64
 from shared.identification.fitting.problem import BLOCK, Problem, Variant
 from shared.identification.leftover.phases import (
+    AGAIN,
     AT_TIMES,
     FROM_THEN,
     ONCE,
@@ -156,13 +157,14 @@ def _pieces(tracks: Sequence[Track], width: Width) -> list[list[list[slice]]]:
 def _pushed(
     problem: Problem, tracks: Sequence[Track], pushes: Sequence[Push], missing: _Missing
 ) -> list[tuple[float, Unexplained]]:
-    """Return what came from outside, each entry with its energy."""
+    """Return what came from outside or looks like it, each entry with its energy."""
     found: list[tuple[float, Unexplained]] = []
     for push in pushes:
         group = _Group(problem.subject.joints[push.joint], push.joint, {})
         is_once = sum(each.joint == push.joint for each in pushes) == 1
-        words = ONCE if is_once else AT_TIMES
-        entry = _entry(problem, tracks[push.track], group, [push.piece], words, missing, True)
+        words = AGAIN if push.is_again else ONCE if is_once else AT_TIMES
+        track, is_external = tracks[push.track], not push.is_again
+        entry = _entry(problem, track, group, [push.piece], words, missing, is_external)
         blocks = push.piece.stop - push.piece.start
         found.append((blocks * entry.times_noise**2, entry))
     return found

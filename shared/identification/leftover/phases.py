@@ -14,6 +14,7 @@ from shared.identification.fitting.problem import BLOCK
 
 THROUGHOUT, ONCE, FROM_THEN, GROWS = "throughout", "once", "from a time on", "grows with time"
 AT_TIMES = "at times"
+AGAIN = "again and again"
 _LONGEST_EVENT = 2.0
 """Of something that happens once (s)."""
 _SHORTEST = 0.5

@@ -2,11 +2,12 @@
 
 A push is told from a law that the model lacks by three things. Its torque is of one sign and begins
 and ends at once, it is far over what is missing otherwise, and where the same joint was at the same
-place as fast and as loaded at other times, that torque was not missing.
+place as fast and as loaded at other times, that torque was not missing. What comes again and again
+at one joint alone, in most recordings, is a law, too: one that goes by something else than those.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,8 @@ _ELSEWHERE = 0.5
 """Share of these at which the torque may be missing too."""
 _AFTER = 0.3
 """Time after a reversal in which a gear with play lets go (s)."""
+_RECUR = 5
+"""Pushes of one joint alone, in three recordings and most of them, that nobody makes by chance."""
 _LATER = 0.3
 """What is not counted after a push, while the arm swings back (s)."""
 
@@ -52,6 +55,8 @@ class Push:
     """(s)."""
     end: float
     """(s)."""
+    is_again: bool = False
+    """Whether it is one of so many at its joint that they are a law rather than pushes."""
 
 
 def pushes_of(tracks: Sequence[Track], missing: Sequence[Float64]) -> tuple[Push, ...]:
@@ -62,7 +67,7 @@ def pushes_of(tracks: Sequence[Track], missing: Sequence[Float64]) -> tuple[Push
         missing: float64[B, J], the torque that is missing in each (N m, N).
     """
     found: list[Push] = []
-    for joint in range(missing[0].shape[1] if missing else 0):
+    for joint in range(_joints(missing)):
         every = np.concatenate([each[:, joint] for each in missing])
         centre = float(np.median(every))
         usual = 1.48 * float(np.median(np.abs(every - centre)))
@@ -80,7 +85,8 @@ def pushes_of(tracks: Sequence[Track], missing: Sequence[Float64]) -> tuple[Push
                 end = float(track.at[piece.stop - 1]) + 0.5 * BLOCK
                 own.append(Push(number, joint, piece, begin, end))
         found += [] if _follow_reversals(tracks, own, joint) else own
-    return tuple(found)
+    again = {joint for joint in range(_joints(missing)) if _recur(found, joint, len(tracks))}
+    return tuple(replace(each, is_again=each.joint in again) for each in found)
 
 
 def not_counted(problem: Problem, segment: int, spans: Sequence[tuple[float, float]]) -> np.ndarray:
@@ -168,6 +174,30 @@ def _follow_reversals(tracks: Sequence[Track], pushes: Sequence[Push], joint: in
     # What a push itself turns round comes after it begins.
     share = np.mean([near[each.track][max(each.piece.start - 2, 0)] for each in pushes])
     return float(share) > chance + 0.5 * (1.0 - chance)
+
+
+def _joints(missing: Sequence[Float64]) -> int:
+    return missing[0].shape[1] if missing else 0
+
+
+def _recur(pushes: Sequence[Push], joint: int, recordings: int) -> bool:
+    """Return whether a joint alone was pushed again and again, in most recordings.
+
+    Someone who takes the hand pushes at many joints at once.
+    """
+    alone = [
+        each
+        for each in pushes
+        if each.joint == joint and not any(_is_beside(each, other) for other in pushes)
+    ]
+    count = len({each.track for each in alone})
+    return len(alone) >= _RECUR and count >= 3 and 2 * count > recordings
+
+
+def _is_beside(one: Push, other: Push) -> bool:
+    """Return whether pushes of two joints overlap."""
+    is_there = one.track == other.track and one.joint != other.joint
+    return is_there and one.begin < other.end and other.begin < one.end
 
 
 def _goes_with_state(

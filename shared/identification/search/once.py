@@ -12,6 +12,7 @@ from shared.identification.effect import IN_RECORDING, ONCE, Candidate
 from shared.identification.fitting.fit import Fit, polish
 from shared.identification.fitting.refit import settle
 from shared.identification.gate.held_out import plain_stretches, stretches
+from shared.identification.leftover.phases import AGAIN
 from shared.identification.leftover.phases import ONCE as ONE_TIME
 from shared.identification.search.bent import is_worse
 from shared.identification.search.events import is_one
@@ -67,7 +68,7 @@ def take_back_pushes(found: Search, left: Sequence[Unexplained]) -> bool:
     swing.
     """
     train, test = found.problem.of("train"), found.problem.of("test")
-    pushed = {each.where for each in left if each.is_external}
+    pushed = {each.where for each in left if each.is_external or each.phase == AGAIN}
     again = [one for one in found.accepted if one.is_event and one.candidate.where in pushed]
     for one in again:
         take_back(found, one, without(found, one, train, test))

@@ -113,6 +113,14 @@ def test_a_push_beside_a_cause_is_told_with_it(searches: Searches):
     assert "pushed elbow once" in more.sentence
 
 
+def test_what_comes_again_and_again_is_told_as_a_law_that_lacks(searches: Searches):
+    push = msgspec.structs.replace(_PUSH, phase="again and again", torque=3.0, torque_unit="N m")
+    found = conclude(searches.search(_BAD, searches.tried(ELBOW, _BAD, _GOOD)), (push, push))
+    assert found.word == "named"
+    assert "At elbow a torque is missing again and again (2 times, most from 0.50" in found.sentence
+    assert "outside" not in found.sentence
+
+
 def test_a_floor_that_nothing_measured_is_not_called_the_noise(searches: Searches):
     found = searches.search(_BAD, searches.tried(ELBOW, _BAD, _GOOD))
     assert "times the noise" in conclude(found, ()).sentence

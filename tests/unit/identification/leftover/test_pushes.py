@@ -1,5 +1,7 @@
 """Torques that were missing for a moment are told from laws that go with what the arm does."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -70,3 +72,38 @@ def test_noise_is_no_push_and_neither_is_what_no_position_shows() -> None:
         loud = [quiet[0] + pulse(6.0), quiet[1]]
         hidden = [track(index, np.zeros(len(_AT))) for index in range(2)]
         assert pushes_of(hidden, [each[:, None] for each in loud]) == ()
+
+
+@pytest.mark.parametrize("is_alone", [True, False])
+@pytest.mark.parametrize(
+    ("counts", "recurs"),
+    [
+        ((2, 2, 1, 0), True),
+        ((2, 2, 0, 0), False),
+        ((2, 1, 1, 0), False),
+        ((4, 1, 1, 0, 0, 0), False),
+    ],
+)
+def test_what_comes_again_at_one_joint_in_most_recordings_is_a_law(
+    counts: tuple[int, ...], recurs: bool, is_alone: bool
+) -> None:
+    rng = np.random.default_rng(7)
+    pushed = [
+        noise(rng) + np.sum([pulse(begin) for begin in _BEGINS[:count]], axis=0) for count in counts
+    ]
+    beside = [noise(rng) if is_alone else each.copy() for each in pushed]
+    both = [np.stack(each, axis=1) for each in zip(pushed, beside, strict=True)]
+    tracks = [_wide(track(index, 20.0 * each)) for index, each in enumerate(pushed)]
+    found = pushes_of(tracks, both)
+    assert [each.is_again for each in found if each.joint == 0] == [recurs and is_alone] * sum(
+        counts
+    )
+
+
+def _wide(one: Track) -> Track:
+    """Return the same of two joints that do alike."""
+    twice = {
+        name: np.repeat(getattr(one, name), 2, axis=1)
+        for name in ("x", "q", "qd", "effort", "load")
+    }
+    return replace(one, **twice)
