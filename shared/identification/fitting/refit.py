@@ -53,8 +53,10 @@ def refit(
     """
     space = fit.space.grown(screened.candidate)
     problem = fit.space.problem
-    quantities = screened.candidate.effect.quantities(problem.subject, screened.candidate.place)
-    is_local = not all(quantity.is_smooth for quantity in quantities)
+    candidate = screened.candidate
+    quantities = candidate.effect.quantities(problem.subject, candidate.place)
+    is_steady = all(quantity.is_smooth for quantity in quantities)
+    is_local = candidate.recording is not None or not is_steady
     picked = segments if is_local else thinned(problem.segments, segments)
     rows = problem.rows_of(segments, picked)
     extra = space.size - fit.space.size

@@ -5,6 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shared.identification.arm.segments import thinned
+from shared.identification.catalogue.external_contact import EFFECT as PUSH
 from shared.identification.catalogue.torque_bias import EFFECT as BIAS
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
@@ -12,6 +14,7 @@ from shared.identification.fitting.fit import Fit, Start, polish
 from shared.identification.fitting.refit import refit, settle
 from shared.identification.fitting.space import Space
 from shared.identification.search.screen import screen
+from shared.identification.search.windows import closer
 from shared.sim.plant.row import Row
 from tests.measured import measure, problem_of
 
@@ -44,6 +47,30 @@ def test_a_rough_refit_finds_the_size_with_the_base_beside_it(tmp_path: Path):
     full = polish(rough.space, rough.z, train)
     assert rough.ratio * fit.cost <= 1.05 * full.cost
     assert rough.ratio < 0.9
+
+
+def test_what_happened_once_is_fitted_to_the_part_in_which_it_was(tmp_path: Path):
+    def push(row: Row) -> None:
+        PUSH.enter(row, "elbow in first", np.array([1.0, 1.6, 0.3]))
+
+    problem = problem_of(measure(tmp_path, np.random.default_rng(0), push, seconds=4.4))
+    problem = problem.in_parts(1.0)
+    space, train = Space(problem), problem.of("train")
+    assert train[1] not in thinned(problem.segments, train)
+    origin = np.zeros(space.size)
+    nominal = Start(origin, space.jacobian(origin, train)[1])
+    fit = polish(space, origin, train, 3)
+    (screened,) = (
+        each
+        for each in screen(fit, [Candidate(PUSH, "elbow in first")], train)
+        if each.candidate.place == "elbow in first"
+    )
+    rough = refit(fit, nominal, closer(fit, screened, train), train, fit)
+    torque, begin, length = rough.space.values(rough.z)[0]
+    assert torque * length == pytest.approx(0.3, rel=0.25)
+    assert (begin, length) == pytest.approx((1.6, 0.3), abs=0.1)
+    everywhere = 0.5 * float(np.sum(rough.space.residual([rough.z], train)[0] ** 2))
+    assert rough.ratio == pytest.approx(everywhere / fit.cost, rel=0.02)
 
 
 def test_a_slight_cause_is_fitted_with_the_derivative_of_the_base(
