@@ -101,7 +101,7 @@ def _by_all(held_out: HeldOut) -> str:
 
 
 def _also_pushed(left: tuple[Unexplained, ...]) -> str:
-    """Return what came from outside, or looks like it; sentences, each after a blank, or nothing."""
+    """Return what came from outside, or looks like it: sentences, each after a blank, or none."""
     told = ""
     if pushes := [each for each in left if each.is_external]:
         first = pushes[0]
