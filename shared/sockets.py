@@ -5,21 +5,33 @@ from collections.abc import Iterable
 from typing import Protocol
 
 
-class Listening(Protocol):
+class _Listening(Protocol):
     """A listening socket, or asyncio's view of one."""
 
-    def fileno(self) -> int:
-        """Return its descriptor."""
+    def fileno(self) -> int: ...
+
+
+class Server(Protocol):
+    """What listens: asyncio's server, or one that is made of it."""
+
+    @property
+    def sockets(self) -> Iterable[_Listening]:
+        """Return what it listens on."""
+        ...
+
+    def close(self) -> None:
+        """Listen no more."""
         ...
 
 
-async def stop_accepting(sockets: Iterable[Listening]) -> None:
-    """Let nobody in any more, and let those become connections who were let in just now.
+async def close_server(server: Server) -> None:
+    """Close a server on its own loop, once those it let in just now have become connections.
 
-    To be awaited on the server's own loop before ``asyncio.Server.close``: that one never closes a
-    connection which was accepted, but whose transport is made after the server has been closed.
+    ``asyncio.Server.close`` by itself never closes a connection which was accepted, but whose
+    transport is made after the server has been closed.
     """
     loop = asyncio.get_running_loop()
-    for sock in sockets:
+    for sock in server.sockets:
         loop.remove_reader(sock.fileno())
     await asyncio.sleep(0.0)
+    server.close()

@@ -11,7 +11,7 @@ from collections.abc import Callable, Coroutine
 from typing import Any, NamedTuple, TypeVar
 
 from shared.errors import ConfigError
-from shared.sockets import stop_accepting
+from shared.sockets import close_server
 
 MAX_CONNECTIONS = 16
 MAX_REQUEST = 16 * 1024
@@ -86,8 +86,7 @@ class Web:
     # From here on: the web's thread.
 
     async def _end(self) -> None:
-        await stop_accepting(self._server.sockets)
-        self._server.close()
+        await close_server(self._server)
         tasks = asyncio.all_tasks() - {asyncio.current_task()}
         for task in tasks:
             task.cancel()

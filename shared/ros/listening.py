@@ -36,7 +36,6 @@ class Listener:
         self._most = most
         self._loop = loop
         self._open = 0
-        self._is_closed = False
         self.refused = 0
         self._socket = socket.create_server((address, 0), backlog=_BACKLOG)
         self._socket.setblocking(False)
@@ -45,12 +44,11 @@ class Listener:
 
     def close(self) -> None:
         """Take no more; those who are served are left alone."""
-        self._is_closed = True
         self._loop.events.remove_reader(self._socket)
         self._socket.close()
 
     def _listen(self) -> None:
-        if not self._is_closed:
+        if self._socket.fileno() != -1:  # not closed since it was out of descriptors
             # not the loop's own sock_accept: one that is cancelled loses whom it has just taken
             self._loop.events.add_reader(self._socket, self._take)
 

@@ -11,7 +11,7 @@ import structlog
 
 from shared.errors import MessageError
 from shared.ros.errors import RosError
-from shared.sockets import stop_accepting
+from shared.sockets import close_server
 
 LARGEST: Final = 4 << 20
 """Bytes of a request or a reply; the state of a PR2's whole system takes 0.2 MB."""
@@ -145,8 +145,7 @@ class XmlRpcServer:
         """Stop listening, and let go of those who are just asking."""
         self._is_closed = True
         if self._server is not None:
-            await stop_accepting(self._server.sockets)
-            self._server.close()
+            await close_server(self._server)
         for writer in self._serving:
             writer.transport.abort()
 

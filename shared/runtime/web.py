@@ -23,7 +23,7 @@ from websockets.http11 import Request, Response
 
 from shared.errors import ConfigError
 from shared.runtime.talk import Tally
-from shared.sockets import stop_accepting
+from shared.sockets import close_server
 
 START_SECONDS = 10.0
 CLOSE_SECONDS = 2.0
@@ -140,8 +140,7 @@ class WebServer:
         )  # fmt: skip
 
     async def _end(self) -> None:
-        await stop_accepting(self._server.sockets)
-        self._server.close()
+        await close_server(self._server)
         await self._server.wait_closed()
 
     async def _cancel(self) -> None:

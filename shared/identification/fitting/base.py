@@ -157,26 +157,25 @@ def _start_without(start: Start, gone: Sequence[int]) -> Start:
 
 def _fitted(space: Space, searched: Float64) -> BaseFits:
     """Return the better one of two fits: from nominal by way of short parts, and directly."""
-    problem = space.problem
     parts, origin = _on_parts(space), np.zeros(space.size)
-    pieces = parts.problem.of("train")
+    pieces, segments = parts.problem.of("train"), space.problem.of("train")
+    is_same = parts.problem is space.problem
     at_nominal = Fit.at(parts, origin, pieces, is_rough=True)
     near, some = polish_on_some(at_nominal, pieces, 6)
-    begun = near if some == pieces else polish(parts, near.z, pieces, 6)
-    if parts.problem is problem:
-        fits, other = [begun], _from_elsewhere(space, searched, near, some)
-        agree = max(near.cost, other.cost) <= _as_good(min(near.cost, other.cost))
-        if other.cost < near.cost:
-            fits.append(other if some == pieces else polish(space, other.z, pieces, 6))
-    else:
-        segments = problem.of("train")
-        first = polish(space, begun.z, segments, 6)
-        fits = [first, _from_elsewhere(space, searched, first, segments)]
-        agree = max(fit.cost for fit in fits) <= _as_good(min(fit.cost for fit in fits))
-    best = min(fits, key=lambda fit: fit.cost)
+    begun = _to_all(near, some, pieces)
+    first, asked = (near, some) if is_same else (polish(space, begun.z, segments, 6), segments)
+    other = _from_elsewhere(space, searched, first, asked)
+    agree = max(first.cost, other.cost) <= _as_good(min(first.cost, other.cost))
+    best = begun if is_same else first
+    if other.cost < first.cost:
+        best = min(best, _to_all(other, asked, segments), key=lambda fit: fit.cost)
     nominal = Start(origin, at_nominal.jacobian)
-    best_on_parts = best if parts.problem is problem else begun
-    return BaseFits(nominal, best_on_parts, replace(best, starts_agree=agree))
+    return BaseFits(nominal, best if is_same else begun, replace(best, starts_agree=agree))
+
+
+def _to_all(fit: Fit, some: tuple[int, ...], segments: tuple[int, ...]) -> Fit:
+    """Return a fit to some of the segments as one to all of them."""
+    return fit if some == segments else polish(fit.space, fit.z, segments, 6)
 
 
 def _from_elsewhere(space: Space, start: Float64, first: Fit, segments: tuple[int, ...]) -> Fit:

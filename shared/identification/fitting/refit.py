@@ -17,7 +17,7 @@ from shared.identification.dataset.types import Float64
 from shared.identification.fitting.fit import Fit, Start, damped, go_down, is_nearly, promised
 from shared.identification.fitting.space import Space
 from shared.identification.fitting.turns import LIKELY, NEAR, aligned, turning_of
-from shared.identification.search.screen import Screened
+from shared.identification.search.screen import Screened, is_steady
 
 _DAMPINGS = (0.01, 0.3, 10.0)
 """Factors of Marquardt's damping that are tried at once."""
@@ -55,8 +55,7 @@ def refit(
     problem = fit.space.problem
     candidate = screened.candidate
     quantities = candidate.effect.quantities(problem.subject, candidate.place)
-    is_steady = all(quantity.is_smooth for quantity in quantities)
-    is_local = candidate.recording is not None or not is_steady
+    is_local = candidate.recording is not None or not is_steady(problem.subject, candidate)
     picked = segments if is_local else thinned(problem.segments, segments)
     rows = problem.rows_of(segments, picked)
     extra = space.size - fit.space.size

@@ -67,7 +67,7 @@ def pushes_of(tracks: Sequence[Track], missing: Sequence[Float64]) -> tuple[Push
         missing: float64[B, J], the torque that is missing in each (N m, N).
     """
     found: list[Push] = []
-    for joint in range(_joints(missing)):
+    for joint in range(missing[0].shape[1] if missing else 0):
         every = np.concatenate([each[:, joint] for each in missing])
         centre = float(np.median(every))
         usual = 1.48 * float(np.median(np.abs(every - centre)))
@@ -85,7 +85,8 @@ def pushes_of(tracks: Sequence[Track], missing: Sequence[Float64]) -> tuple[Push
                 end = float(track.at[piece.stop - 1]) + 0.5 * BLOCK
                 own.append(Push(number, joint, piece, begin, end))
         found += [] if _follow_reversals(tracks, own, joint) else own
-    again = {joint for joint in range(_joints(missing)) if _recur(found, joint, len(tracks))}
+    pushed = {each.joint for each in found}
+    again = {joint for joint in pushed if _recur(found, joint, len(tracks))}
     return tuple(replace(each, is_again=each.joint in again) for each in found)
 
 
@@ -174,10 +175,6 @@ def _follow_reversals(tracks: Sequence[Track], pushes: Sequence[Push], joint: in
     # What a push itself turns round comes after it begins.
     share = np.mean([near[each.track][max(each.piece.start - 2, 0)] for each in pushes])
     return float(share) > chance + 0.5 * (1.0 - chance)
-
-
-def _joints(missing: Sequence[Float64]) -> int:
-    return missing[0].shape[1] if missing else 0
 
 
 def _recur(pushes: Sequence[Push], joint: int, recordings: int) -> bool:

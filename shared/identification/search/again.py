@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from shared.identification.fitting.problem import Problem, Span
+from shared.identification.arm.segments import seconds_of
+from shared.identification.fitting.problem import Span
 from shared.identification.gate.held_out import FEWEST, stretches
 from shared.identification.leftover.pushes import not_counted
 from shared.identification.search.once import is_named
@@ -76,12 +77,5 @@ def pushed_in(found: Search, left: Sequence[Unexplained]) -> tuple[Span, ...]:
     )
     problem = found.problem
     without = replace(problem, aside=(*problem.aside, *spans))
-    kept, all_of_it = _seconds(without), _seconds(problem)
+    kept, all_of_it = (seconds_of(each.segments, each.of("train")) for each in (without, problem))
     return without.aside if _KEPT * all_of_it <= kept < all_of_it else ()
-
-
-def _seconds(problem: Problem) -> float:
-    """Return how long all that is fitted to is (s)."""
-    return sum(
-        float(problem.segments[index].recorded.joints_at[-1]) for index in problem.of("train")
-    )
