@@ -10,6 +10,8 @@ from shared.telemetry.wording import scaled
 WIDTH = 88
 LISTED = 3
 """Of what stays unexplained, on the screen."""
+WARNINGS = 2
+"""Of what a verdict is worth less for, on the screen."""
 TITLES = {
     "named": "A cause was found",
     "none": "Nothing to name",
@@ -126,9 +128,20 @@ def unexplained_text(left: Unexplained, held_out: HeldOut) -> str:
 
 def _unexplained_texts(verdict: Verdict) -> list[str]:
     """Return the largest of what is left, and how many there are beside."""
-    found = [unexplained_text(each, verdict.held_out) for each in verdict.unexplained[:LISTED]]
-    more = len(verdict.unexplained) - len(found)
-    return [*found, f"and {more} more, in the report"] if more else found
+    found = verdict.unexplained
+    return _listed([unexplained_text(each, verdict.held_out) for each in found], LISTED)
+
+
+def _warnings(verdict: Verdict) -> list[str]:
+    """Return what makes a verdict worth less, and how much there is beside."""
+    agree = "base fits from different starts did not meet: believe little of this"
+    return _listed([*([] if verdict.starts_agree else [agree]), *verdict.caveats], WARNINGS)
+
+
+def _listed(texts: list[str], most: int) -> list[str]:
+    """Return the first of some texts, and how many there are beside."""
+    more = len(texts) - most
+    return [*texts[:most], f"and {more} more, in the report"] if more > 0 else texts
 
 
 def when_text(left: Unexplained) -> str:
@@ -160,7 +173,6 @@ def verdict_text(verdict: Verdict, folder: Path) -> str:
         add("", [f"removes {share} of what could be explained"])
     add("unexplained", _unexplained_texts(verdict))
     add("record next", list(verdict.record_next[:3]))
-    if not verdict.starts_agree:
-        add("beware", ["base fits from different starts did not meet: believe little of this"])
+    add("beware", _warnings(verdict))
     add("report", [str(folder / "report.html")])
     return "\n".join(lines)

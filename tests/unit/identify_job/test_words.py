@@ -157,12 +157,25 @@ def test_the_last_lines_say_the_verdict_and_where_the_report_is(word: str) -> No
     flat = " ".join(text.split())
     assert verdict.sentence in flat
     assert "out/report.html" in flat
-    assert flat.count("beware") == (not verdict.starts_agree)
+    is_warned = bool(verdict.caveats) or not verdict.starts_agree
+    assert flat.count("beware") == is_warned
     for cause in (*verdict.causes, *(each for tie in verdict.ties for each in tie.causes)):
         assert quantity_text(cause.value, cause.unit, cause.interval) in flat
     for sentence in verdict.record_next:
         assert sentence in flat
     assert max(len(line) for line in text.splitlines()) <= 88
+
+
+@pytest.mark.parametrize(("count", "more"), [(1, ""), (2, ""), (4, "and 2 more, in the report")])
+def test_what_a_verdict_is_worth_less_for_is_told_on_the_screen(count: int, more: str) -> None:
+    caveats = tuple(f"reason {number}" for number in range(count))
+    verdict = msgspec.structs.replace(example("named").verdict, caveats=caveats)
+    verdict = msgspec.structs.replace(verdict, starts_agree=True)
+    told = verdict_text(verdict, Path("out")).partition("beware")[2].splitlines()
+    said = [f"reason {number}" for number in range(min(count, 2))] + [more] * bool(more)
+    assert [line.strip() for line in told[: len(said)]] == said
+    doubted = msgspec.structs.replace(verdict, starts_agree=False)
+    assert "did not meet" in verdict_text(doubted, Path("out")).partition("beware")[2]
 
 
 @pytest.mark.parametrize(("count", "more"), [(2, ""), (3, ""), (5, "and 2 more, in the report")])
