@@ -161,6 +161,8 @@ def compiled(plant: Plant, structure: Structure) -> mujoco.MjModel:
     builder = Builder(plant)
     for edit in structure:
         edit.change(builder)
+    for body in builder.spec.bodies:
+        body.simple = False  # else a lone link whose centre moves is refused
     return builder.spec.compile()
 
 
