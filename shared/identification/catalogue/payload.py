@@ -8,6 +8,7 @@ import numpy as np
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
+from shared.sim.plant.inertia import add_inertia
 from shared.sim.plant.kinematics import turned_axes
 from shared.sim.plant.plant import Plant, is_weightless
 from shared.sim.plant.row import Row
@@ -16,6 +17,8 @@ from shared.sim.plant.structure import Structure, compiled
 _GRAVITY = 9.81
 """m/s^2."""
 OFF_CENTRE: Final = "tool off its centre"
+_REACH = 0.5
+"""About as far beside the tool's centre as something held may be (m)."""
 
 
 class Payload:
@@ -49,10 +52,11 @@ class Payload:
         """Make the tool's body heavier, its radius of gyration unchanged.
 
         The springs of a counterbalanced arm, or a controller that carries its weight, do not know
-        of it: there it pulls by itself.
+        of it: there it pulls by itself. Beside the centre it is harder to turn, too (Steiner).
         """
         body, added = row.tool_body(), float(values[0])
         mass = row.field("body_mass")
+        own = float(mass[body])
         if is_weightless(row.model):
             row.forces[body] = (0.0, 0.0, -_GRAVITY * added)
         grown = (mass[body] + added) / mass[body]
@@ -61,7 +65,29 @@ class Payload:
         if row.model.body_gravcomp[body]:
             row.field("body_gravcomp")[body] /= grown
         if place == OFF_CENTRE:
-            row.field("body_ipos")[body, np.array(_turned(row.plant))] += values[1:]
+            moved = np.zeros(3)
+            moved[np.array(_turned(row.plant))] = values[1:]
+            row.field("body_ipos")[body] += moved
+            add_inertia(row, body, _apart(own, added, moved))
+
+
+def _apart(own: float, added: float, moved: Float64) -> Float64:
+    """Return float64[3, 3], what two masses are harder to turn for being apart (kg m^2).
+
+    As they come together by Steiner's theorem, about the centre of both. No mass beside the centre
+    would have to be infinitely far off to move it, so further off than can be it is less.
+
+    Args:
+        own: the tool's (kg).
+        added: what it carries (kg).
+        moved: float64[3], from its centre to that of both (m).
+    """
+    both = own + added
+    square = float(moved @ moved)
+    least = added**4 + square**2 * (both / _REACH) ** 4
+    if not least:
+        return np.zeros((3, 3))
+    return own * both * added**3 / least * (square * np.eye(3) - np.outer(moved, moved))
 
 
 def _hangs(subject: Subject) -> bool:

@@ -137,6 +137,49 @@ def test_a_payload_beside_the_tools_centre_moves_it(subject: Subject):
     assert (found.q[-1, 2] - plain.q[-1, 2]) * 200 == pytest.approx(9.81 * lever, rel=0.08)
 
 
+def test_a_payload_beside_the_tools_centre_turns_as_one_that_is_welded_there(tmp_path: Path):
+    # of the forearm's own shape, 0.5 kg at (0.1, 0.06, -0.04) m from the centre of its 0.5 kg
+    path = write_arm(tmp_path)
+    plant = mjcf(path, "position", JOINTS, JOINTS, "tool")
+    own = make_subject(plant).nominal.model
+    fore = int(own.body("fore").id)
+    at, beside = own.body_ipos[fore], np.array([0.1, 0.06, -0.04])
+
+    def numbers(values: np.ndarray) -> str:
+        return " ".join(f"{value:.17g}" for value in values)
+
+    inertial = (
+        f'<inertial mass="0.5" pos="{numbers(at + beside)}" quat="{numbers(own.body_iquat[fore])}"'
+        f' diaginertia="{numbers(own.body_inertia[fore])}"/>'
+    )
+    welded = tmp_path / "welded.xml"
+    text = path.read_text()
+    begin = text.index('<body name="fore"')
+    end = text.index("</body>", begin)
+    welded.write_text(f'{text[:end]}<body name="held">{inertial}</body>{text[end:]}')
+    fast = recorded(swing, seconds=2.0)
+    wanted = replay(make_subject(mjcf(welded, "position", JOINTS, JOINTS, "tool")), fast).q
+    size = [0.5, *(0.5 * beside)]  # the centre of both is half-way
+    found = replay(make_subject(plant), fast, payload.EFFECT, payload.OFF_CENTRE, size).q
+    alone = replay(make_subject(plant), fast, payload.EFFECT, payload.OFF_CENTRE, [0.5, 0, 0, 0]).q
+    assert np.abs(alone - wanted).max() > 2e-3
+    np.testing.assert_allclose(found, wanted, atol=2e-5)
+
+
+def test_what_moves_the_tools_centre_without_a_mass_is_no_harder_to_turn(subject: Subject):
+    seen: list[np.ndarray] = []
+
+    def enter(row: Row) -> None:
+        before = row.field("body_inertia").copy()
+        for mass in (0.0, 1e-4, 0.3):
+            payload.EFFECT.enter(row, payload.OFF_CENTRE, np.array([mass, 0.01, 0.0, 0.02]))
+            seen.append(row.field("body_inertia").sum() - before.sum())
+
+    subject.nominal.run([(enter, recorded([0.0, 0.0, 0.0], seconds=0.1))])
+    assert seen[0] == pytest.approx(0.0)
+    assert seen[1] < 1e-3 < seen[2]
+
+
 def test_where_the_centre_comes_to_lie_is_the_same_on_a_base_that_gives():
     """Both joints turn about y, hinges that are added for the base do not."""
     pendulum = make_subject(ARMS["torque2"].make())
