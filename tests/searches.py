@@ -8,6 +8,7 @@ from shared.identification.catalogue.torque_bias import EFFECT as BIAS
 from shared.identification.catalogue.viscous_friction import EFFECT as VISCOUS
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
+from shared.identification.fitting.base import WINDOW
 from shared.identification.fitting.fit import Fit, Start, polish
 from shared.identification.fitting.space import Space
 from shared.identification.gate.held_out import compare
@@ -27,6 +28,8 @@ class Searches:
         # losses that are made up are the same whatever of the noise is new
         self.problem = plain(problem_of(measure(folder, rng, enter, seconds=seconds)))
         self.base = self.fit(())
+        in_parts = Space(self.problem.in_parts(WINDOW))
+        self.parts = Fit.at(in_parts, self.base.z, in_parts.problem.of("train"))
         self._fits: dict[tuple[Candidate, ...], Fit] = {}
 
     def fit(self, candidates: tuple[Candidate, ...]) -> Fit:
@@ -67,7 +70,7 @@ class Searches:
             doubted=doubted,
             base=self.base,
             nominal=Start(self.base.z, self.base.jacobian),
-            parts=self.base,
+            parts=self.parts,
             current=current or (self.base if accepted is None else accepted.fit),
             nominal_losses=base,
             base_losses=base,

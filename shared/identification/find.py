@@ -177,7 +177,7 @@ def _searched(
     clock.over("unexplained")
     if is_open(found) and leave_out(untouched, left):
         progress("screen", 0.0, "again, without held-out stretches in which something pushed")
-        found = untouched
+        found = fresh(untouched, seed)
         search(found, progress)
         clock.over("search")
         left = _left(found, _pushes(left))

@@ -7,8 +7,8 @@ import numpy as np
 
 from shared.identification.dataset.types import Float64
 from shared.identification.fitting.cmaes import minimize
-from shared.identification.fitting.fit import ENOUGH, Fit, Start, go_down, polish
-from shared.identification.fitting.long import polish_by_parts, polish_on_some
+from shared.identification.fitting.fit import ENOUGH, Fit, Start, go_down, polish, widened
+from shared.identification.fitting.long import polish_on_some
 from shared.identification.fitting.space import Space
 from shared.identification.noise.floor import Noise
 from shared.sim.plant.plant import Control
@@ -121,11 +121,13 @@ def fit_without(space: Space, done: BaseFits, doubted: Sequence[int]) -> BaseFit
         done: with them.
         doubted: which of its coordinates they were.
     """
-    begun, best = (np.delete(fit.z, doubted) for fit in (done.parts, done.whole))
     parts = _on_parts(space)
-    near = polish_by_parts(parts, begun, parts.problem.of("train"), 6)
+    begun, best = (
+        _start_without(Start(fit.z, fit.jacobian), doubted) for fit in (done.parts, done.whole)
+    )
+    near = _fit_from(parts, [begun.z], begun.jacobian)
     is_same = parts.problem is space.problem
-    whole = near if is_same else polish(space, best, space.problem.of("train"), 6)
+    whole = near if is_same else _fit_from(space, [best.z, near.z], best.jacobian)
     nominal = _start_without(done.nominal, doubted)
     return BaseFits(nominal, near, replace(whole, starts_agree=done.whole.starts_agree))
 
@@ -138,14 +140,28 @@ def fit_with(space: Space, done: BaseFits, start: Float64) -> BaseFits:
         done: without.
         start: float64[K], where they begin.
     """
-    parts, origin = _on_parts(space), np.zeros(space.size)
-    pieces = parts.problem.of("train")
-    nominal = Start(origin, parts.jacobian(origin, pieces, is_rough=True)[1])
-    near = polish_by_parts(parts, np.r_[done.parts.z, start], pieces, 6)
-    is_same = parts.problem is space.problem
-    begun = np.r_[done.whole.z, start]
-    whole = near if is_same else polish(space, begun, space.problem.of("train"), 6)
+    parts, origin, known = _on_parts(space), np.zeros(space.size), done.nominal.z.size
+
+    def at(space: Space, z: Float64, kept: Float64) -> Float64:
+        return widened(space, z, kept, space.problem.of("train"), known)
+
+    begun, best = (np.r_[fit.z, start] for fit in (done.parts, done.whole))
+    nominal = Start(origin, at(parts, origin, done.nominal.jacobian))
+    near = _fit_from(parts, [begun], at(parts, begun, done.parts.jacobian))
+    whole = near
+    if parts.problem is not space.problem:
+        whole = _fit_from(space, [best, near.z], at(space, best, done.whole.jacobian))
     return BaseFits(nominal, near, replace(whole, starts_agree=done.whole.starts_agree))
+
+
+def _fit_from(space: Space, starts: list[Float64], jacobian: Float64) -> Fit:
+    """Return a fit from the best of some starts, with the derivative at the first."""
+    segments = space.problem.of("train")
+    found = space.residual(starts, segments)
+    best = int(np.argmin(np.sum(found**2, axis=1)))
+    begun = Fit.of(space, starts[best], found[best], jacobian)
+    near, some = polish_on_some(replace(begun, is_rough=True), segments, 6)
+    return _to_all(near, some)
 
 
 def _start_without(start: Start, gone: Sequence[int]) -> Start:
@@ -156,25 +172,47 @@ def _start_without(start: Start, gone: Sequence[int]) -> Start:
 
 
 def _fitted(space: Space, searched: Float64) -> BaseFits:
-    """Return the better one of two fits: from nominal by way of short parts, and directly."""
+    """Return the better one of two fits: from nominal by way of short parts, and from elsewhere.
+
+    Of long recordings the two are told on some of their parts.
+    """
     parts, origin = _on_parts(space), np.zeros(space.size)
-    pieces, segments = parts.problem.of("train"), space.problem.of("train")
-    is_same = parts.problem is space.problem
+    pieces = parts.problem.of("train")
     at_nominal = Fit.at(parts, origin, pieces, is_rough=True)
     near, some = polish_on_some(at_nominal, pieces, 6)
-    begun = _to_all(near, some, pieces)
-    first, asked = (near, some) if is_same else (polish(space, begun.z, segments, 6), segments)
-    other = _from_elsewhere(space, searched, first, asked)
+    best = _to_all(near, some)
+    if parts.problem is space.problem:
+        whole = best = _better(near, some, searched, best)
+    elif some != pieces:
+        best = _better(near, some, searched, best)
+        whole = polish(space, best.z, space.problem.of("train"), 6)
+        whole = replace(whole, starts_agree=best.starts_agree)
+    else:
+        segments = space.problem.of("train")
+        whole = polish(space, best.z, segments, 6)
+        whole = _better(whole, segments, searched, whole)
+    return BaseFits(nominal=Start(origin, at_nominal.jacobian), parts=best, whole=whole)
+
+
+def _better(first: Fit, segments: tuple[int, ...], start: Float64, found: Fit) -> Fit:
+    """Return a fit to all recordings or one from a second start, and whether the two agree.
+
+    Args:
+        first: the fit on which they are compared.
+        segments: of that.
+        start: float64[n], the second one.
+        found: where the first leads to on all recordings.
+    """
+    other = _from_elsewhere(first.space, start, first, segments)
     agree = max(first.cost, other.cost) <= _as_good(min(first.cost, other.cost))
-    best = begun if is_same else first
-    if other.cost < first.cost:
-        best = min(best, _to_all(other, asked, segments), key=lambda fit: fit.cost)
-    nominal = Start(origin, at_nominal.jacobian)
-    return BaseFits(nominal, best if is_same else begun, replace(best, starts_agree=agree))
+    if other.cost < first.cost and not (agree and found is not first):
+        found = min(found, _to_all(other, segments), key=lambda fit: fit.cost)
+    return replace(found, starts_agree=agree)
 
 
-def _to_all(fit: Fit, some: tuple[int, ...], segments: tuple[int, ...]) -> Fit:
-    """Return a fit to some of the segments as one to all of them."""
+def _to_all(fit: Fit, some: tuple[int, ...]) -> Fit:
+    """Return a fit to some of the recordings' parts as one to all that there are to fit to."""
+    segments = fit.space.problem.of("train")
     return fit if some == segments else polish(fit.space, fit.z, segments, 6)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.fitting.base import BaseFits, fit_with
+from shared.identification.fitting.fit import descend
 from shared.identification.fitting.parameters import LOOSE, BaseParameter
 from shared.identification.fitting.space import Space
 from shared.sim.plant.row import Row
@@ -19,7 +20,7 @@ _DEFAULT = 1.0 / 9.0
 _LOOKED = 0.3
 """Of that, at which is looked."""
 _PLAINLY = 20.0
-"""Twice what it takes off the cost, at least."""
+"""Twice what it takes off the cost, at least; in mean squares of what is left, if that is more."""
 
 
 def creep_of(subject: Subject) -> tuple[BaseParameter, ...]:
@@ -46,10 +47,14 @@ def with_creep(done: BaseFits, creep: tuple[BaseParameter, ...]) -> BaseFits:
     space = Space(done.whole.space.problem.freer(creep))
     train = space.problem.of("train")
     start = np.r_[done.whole.z, _LOOKED]
-    if _expected(done, space.residual([start], train)[0]) < _PLAINLY:
+    plainly = _PLAINLY * max(1.0, 2.0 * done.whole.cost / len(done.whole.residual))
+    if _expected(done, space.residual([start], train)[0]) < plainly:
         return done
-    found = fit_with(space, done, start[-1:])
-    return found if 2.0 * (done.whole.cost - found.whole.cost) > _PLAINLY else done
+    down = descend(space, [start], done.whole.jacobian, train, done.whole.z.size)
+    if 2.0 * (done.whole.cost - down.cost) < plainly:
+        return done
+    found = fit_with(space, done, down.z[done.whole.z.size :])
+    return found if 2.0 * (done.whole.cost - found.whole.cost) > plainly else done
 
 
 def _expected(done: BaseFits, residual: Float64) -> float:

@@ -15,6 +15,8 @@ ENOUGH = 1e-3
 """A step that takes off less than this share of the cost is the last one."""
 _DAMPINGS = (1e-3, 1e-1, 1.0, 100.0)
 """Factors of Marquardt's damping that are tried at once."""
+BOLD = (0.01, 0.3, 10.0)
+"""The same, of a derivative that is mended from the start."""
 _HARDLY = 1e-4
 """Damping of a step that goes nearly to where the derivative says the bottom is."""
 _MUCH = 0.01
@@ -163,6 +165,48 @@ def go_down(
         if is_enough and promised(Fit(space, z, residual, jacobian, cost)) > cost * (1 - slight):
             break
     return Fit(space, z, residual, jacobian, cost)
+
+
+def descend(
+    space: Space, starts: list[Float64], kept: Float64, segments: tuple[int, ...], known: int,
+    factors: tuple[float, ...] = BOLD,
+) -> Fit:  # fmt: skip
+    """Go down from the best of some starts with a derivative of which part is known.
+
+    Args:
+        space: what is fitted.
+        starts: float64[n] each.
+        kept: float64[at least M, at least ``known``], a derivative; of its rows the first M.
+        segments: recordings to fit to.
+        known: so many columns of it are.
+        factors: of the damping, tried at once.
+    """
+    found = space.residual(starts, segments)
+    costs = 0.5 * np.sum(found**2, axis=1)
+    best = int(np.argmin(costs))
+    z, residual = starts[best], found[best]
+    jacobian = widened(space, z, kept, segments, known)
+    return go_down(Fit.of(space, z, residual, jacobian), segments, factors)
+
+
+def widened(
+    space: Space, z: Float64, kept: Float64, segments: tuple[int, ...], known: int
+) -> Float64:
+    """Return float64[M + n, n], a derivative of which only some columns have to be found.
+
+    Args:
+        space: what is fitted.
+        z: float64[n], where.
+        kept: float64[at least M, at least ``known``], the same of fewer; of its rows the first M.
+        segments: recordings to fit to.
+        known: so many columns of it are.
+    """
+    _, own = space.jacobian(z, segments, range(known, space.size), is_rough=True)
+    rows = len(own) - space.size
+    base = np.zeros((len(own), known))
+    base[:rows] = kept[:rows, :known]
+    base[rows : rows + known] = np.diag(1.0 / space.priors[:known])
+    return np.concatenate([base, own], axis=1)
 
 
 def is_foretold(before: Fit, after: Fit) -> bool:

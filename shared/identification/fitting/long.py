@@ -4,11 +4,12 @@ What the first steps of a fit are after shows in a part of the motion, at a part
 it says where the fit ends.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from shared.identification.arm.segments import ENOUGH_SECONDS, seconds_of, thinned
 from shared.identification.dataset.types import Float64
-from shared.identification.fitting.fit import Fit, polish
+from shared.identification.fitting.fit import ENOUGH, Fit, polish
 from shared.identification.fitting.problem import Problem
 from shared.identification.fitting.space import Space
 
@@ -60,3 +61,32 @@ def polish_by_parts(space: Space, start: Float64, segments: tuple[int, ...], ste
     if some != segments:
         start = polish(space, start, some, steps).z
     return polish(space, start, segments, steps)
+
+
+def polish_better(
+    fit: Fit, parts: Problem, starts: Sequence[Float64], segments: tuple[int, ...], steps: int
+) -> Fit:
+    """Return a fit, or a better one that another start leads to.
+
+    Of long recordings it is told on some short parts which start leads furthest down, and only that
+    one is followed.
+
+    Args:
+        fit: to recordings.
+        parts: the same recordings in short parts.
+        starts: float64[n] each.
+        segments: of the fit.
+        steps: the most derivatives, each time.
+    """
+    space, pieces = fit.space, parts.of("train")
+    some = some_of(parts, pieces)
+    if some == pieces or parts is space.problem:
+        fits = [polish_by_parts(space, start, segments, steps) for start in starts]
+    else:
+        short = Space(parts, space.candidates)
+        own, *others = (polish(short, start, some, steps) for start in (fit.z, *starts))
+        best = min(others, key=lambda each: each.cost)
+        if best.cost > own.cost * (1 - ENOUGH):
+            return fit
+        fits = [polish(space, best.z, segments, steps)]
+    return min(fit, *fits, key=lambda each: each.cost)

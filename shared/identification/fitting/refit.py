@@ -14,13 +14,20 @@ from numpy.typing import NDArray
 
 from shared.identification.arm.segments import thinned
 from shared.identification.dataset.types import Float64
-from shared.identification.fitting.fit import Fit, Start, damped, go_down, is_nearly, promised
+from shared.identification.fitting.fit import (
+    BOLD,
+    Fit,
+    Start,
+    damped,
+    descend,
+    go_down,
+    is_nearly,
+    promised,
+)
 from shared.identification.fitting.space import Space
 from shared.identification.fitting.turns import LIKELY, NEAR, aligned, turning_of
 from shared.identification.search.screen import Screened, is_steady
 
-_DAMPINGS = (0.01, 0.3, 10.0)
-"""Factors of Marquardt's damping that are tried at once."""
 _MENDING = (1e-4, 1e-2, 1.0)
 """Dampings of the last step of a rough refit."""
 _PARTS = (1.0, 0.5, 0.25)
@@ -70,7 +77,7 @@ def refit(
         ways.append(space.clip(there))
     ways.append(space.clip(np.r_[begun.z, screened.start]))
     known = begun.on(rows)
-    down = _descend(space, ways, known.jacobian, picked, fit.space.size)
+    down = descend(space, ways, known.jacobian, picked, fit.space.size)
     found = [down]
     is_plain = bool(fit.space.candidates) and not any(each.phase for each in quantities)
     if not (is_plain and fit.is_near_noise):
@@ -94,7 +101,7 @@ def _from_nominal(
     sizes = [space.clip(np.r_[base, size]) for size in (screened.start, half)]
     kept = nominal.jacobian[: len(rows)][rows]
     sizes[0] = aligned(space, sizes[0], picked, base=kept)
-    return _descend(space, sizes, kept, picked, nominal.z.size)
+    return descend(space, sizes, kept, picked, nominal.z.size)
 
 
 def refit_late(late: Rough, screened: Screened, fit: Fit, segments: tuple[int, ...]) -> Rough:
@@ -129,31 +136,6 @@ def _mended(
     return (tries[best], float(costs[best])) if costs[best] < cost else (z, cost)
 
 
-def _descend(
-    space: Space, starts: list[Float64], kept: Float64, segments: tuple[int, ...], known: int
-) -> Fit:
-    """Go down from the best of some starts with a derivative of which part is known.
-
-    Args:
-        space: what is fitted.
-        starts: float64[n] each.
-        kept: float64[at least M, at least ``known``], a derivative; of its rows the first M.
-        segments: recordings to fit to.
-        known: so many columns of it are.
-    """
-    found = space.residual(starts, segments)
-    costs = 0.5 * np.sum(found**2, axis=1)
-    best = int(np.argmin(costs))
-    z, residual = starts[best], found[best]
-    _, own = space.jacobian(z, segments, range(known, space.size), is_rough=True)
-    rows = len(residual) - space.size
-    base = np.zeros((len(residual), known))
-    base[:rows] = kept[:rows, :known]
-    base[rows : rows + known] = np.diag(1.0 / space.priors[:known])
-    jacobian = np.concatenate([base, own], axis=1)
-    return go_down(Fit.of(space, z, residual, jacobian), segments, _DAMPINGS)
-
-
 def settle(
     space: Space, start: Float64, segments: tuple[int, ...], known: Fit | None = None
 ) -> Fit:
@@ -169,15 +151,15 @@ def settle(
         known: a fit to them without the newest candidate.
     """
     if known is not None and turning_of(space) is None:
-        down = _descend(space, [space.clip(start)], known.jacobian, segments, known.space.size)
+        down = descend(space, [space.clip(start)], known.jacobian, segments, known.space.size)
         if _is_straight(known, down):
             return down
         start = down.z
     before = _in_turn(Fit.at(space, space.clip(start), segments, is_rough=True), segments)
-    found = go_down(before, segments, _DAMPINGS)
+    found = go_down(before, segments, BOLD)
     if found.cost > before.cost * (1 - _ENOUGH) or _is_there(found):
         return found
-    return go_down(Fit.at(space, found.z, segments), segments, _DAMPINGS)
+    return go_down(Fit.at(space, found.z, segments), segments, BOLD)
 
 
 def _is_straight(known: Fit, down: Fit) -> bool:

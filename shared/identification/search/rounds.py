@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from shared.identification.fitting.fit import Fit, polish
-from shared.identification.fitting.long import polish_by_parts
+from shared.identification.fitting.long import polish_better
 from shared.identification.fitting.refit import Rough, settle
 from shared.identification.fitting.space import Space
 from shared.identification.gate.certainty import SURE, is_there
@@ -194,9 +194,8 @@ def _begun_anew(found: Search, one: Tried, train: tuple[int, ...]) -> Tried:
     """
     begins = (found.current.z, found.nominal.with_causes_of(found.current))
     starts = [np.r_[z, one.screened.start] for z in begins]
-    fits = [polish_by_parts(one.fit.space, start, train, _AFRESH) for start in starts]
-    fit = min(fits, key=lambda each: each.cost)
-    if fit.cost >= one.fit.cost:
+    fit = polish_better(one.fit, found.parts.space.problem, starts, train, _AFRESH)
+    if fit is one.fit:
         return one
     return _tried(found, one.screened, fit, one.is_event)
 

@@ -10,6 +10,7 @@ import pytest
 from shared.identification.arm.subject import recorded_of, subject_of
 from shared.identification.dataset.types import Dataset, Float64, ModelSource, Trajectory
 from shared.identification.fitting.base import (
+    WINDOW,
     BaseFits,
     _from_elsewhere,  # pyright: ignore[reportPrivateUsage]
     _usual_power,  # pyright: ignore[reportPrivateUsage]
@@ -109,7 +110,9 @@ def test_what_is_taken_out_of_a_base_is_taken_out_of_the_derivative_at_the_nomin
     full, space = Space(problem), Space(replace(problem, parameters=kept))
     whole = polish(full, np.zeros(full.size), problem.of("train"), 1)
     at_nominal = Start(np.zeros(full.size), full.jacobian(np.zeros(full.size), (0,))[1])
-    found = fit_without(space, BaseFits(at_nominal, whole, whole), gone)
+    in_parts = Space(problem.in_parts(WINDOW))
+    parts = Fit.at(in_parts, whole.z, in_parts.problem.of("train"))
+    found = fit_without(space, BaseFits(at_nominal, parts, whole), gone)
     _, wanted = space.jacobian(np.zeros(space.size), (0,))
     assert found.nominal.jacobian == pytest.approx(wanted)
     assert found.nominal.z == pytest.approx(np.zeros(space.size))

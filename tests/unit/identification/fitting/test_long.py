@@ -6,8 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shared.identification.fitting.base import fit_base
 from shared.identification.fitting.fit import Fit, polish
-from shared.identification.fitting.long import polish_by_parts, polish_on_some, some_of
+from shared.identification.fitting.long import (
+    polish_better,
+    polish_by_parts,
+    polish_on_some,
+    some_of,
+)
 from shared.identification.fitting.problem import Problem
 from shared.identification.fitting.space import Space
 from tests.measured import measure, problem_of
@@ -70,3 +76,63 @@ def test_a_fit_by_way_of_some_parts_ends_where_a_fit_to_all_of_them_does(
     assert some == some_of(problem, train)
     assert near.cost == pytest.approx(fits[0][1].cost, rel=2e-3)
     assert len(near.residual) < len(found.residual)
+
+
+@pytest.fixture
+def whole(problem: Problem) -> Space:
+    """Return what is fitted to whole recordings."""
+    return Space(replace(problem, window=None))
+
+
+@pytest.mark.usefixtures("is_long")
+def test_of_several_starts_the_best_one_on_some_short_parts_is_followed_in_whole_recordings(
+    problem: Problem, whole: Space, monkeypatch: pytest.MonkeyPatch
+):
+    train = whole.problem.of("train")
+    bad = Fit.at(whole, np.full(whole.size, 1.0), train)
+    asked: list[tuple[int, ...]] = []
+
+    def seen(space: Space, start: np.ndarray, segments: tuple[int, ...], steps: int) -> Fit:
+        asked.append(segments)
+        return polish(space, start, segments, steps if len(asked) > 1 else 0)
+
+    monkeypatch.setattr("shared.identification.fitting.long.polish", seen)
+    starts = [np.full(whole.size, off) for off in (0.8, 0.05)]
+    found = polish_better(bad, problem, starts, train, 8)
+    some = some_of(problem, problem.of("train"))
+    assert asked == [some, some, some, train]
+    assert found.cost == pytest.approx(polish(whole, starts[1], train, 8).cost, rel=2e-3)
+
+
+@pytest.mark.usefixtures("is_long")
+def test_a_fit_is_kept_if_no_start_leads_further_down_on_some_short_parts(
+    problem: Problem, whole: Space
+):
+    train = whole.problem.of("train")
+    good = polish(whole, np.zeros(whole.size), train, 8)
+    assert polish_better(good, problem, [np.full(whole.size, 0.05)], train, 8) is good
+
+
+def test_of_short_recordings_each_start_is_followed_in_whole_ones(problem: Problem, whole: Space):
+    train = whole.problem.of("train")
+    starts = [np.full(whole.size, off) for off in (0.3, 0.05)]
+    costs = [polish_by_parts(whole, start, train, 8).cost for start in starts]
+    bad = Fit.at(whole, np.full(whole.size, 1.0), train)
+    assert polish_better(bad, problem, starts, train, 8).cost == min(costs) < bad.cost
+    good = replace(bad, cost=0.5 * min(costs))
+    assert polish_better(good, problem, starts, train, 8) is good
+
+
+@pytest.mark.usefixtures("is_long")
+def test_the_base_of_long_recordings_ends_where_that_of_short_ones_does(
+    problem: Problem, monkeypatch: pytest.MonkeyPatch
+):
+    space = Space(replace(problem, window=None))
+    by_some = fit_base(space, np.random.default_rng(0))
+    monkeypatch.setattr("shared.identification.fitting.long.ENOUGH_SECONDS", 15.0)
+    direct = fit_base(space, np.random.default_rng(0))
+    assert by_some.whole.starts_agree == direct.whole.starts_agree
+    assert by_some.whole.cost == pytest.approx(direct.whole.cost, rel=2e-3)
+    assert by_some.parts.cost == pytest.approx(direct.parts.cost, rel=0.02)
+    assert by_some.whole.space.problem is space.problem
+    assert len(by_some.parts.residual) == len(direct.parts.residual)
