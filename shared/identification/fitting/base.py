@@ -155,17 +155,22 @@ def fit_with(space: Space, done: BaseFits, start: Float64) -> BaseFits:
 
 
 def _fit_from(space: Space, starts: list[Float64], jacobian: Float64) -> Fit:
-    """Return a fit from the best of some starts, with the derivative at the first."""
+    """Return a fit from the best of some starts, with a derivative that is known near the first.
+
+    One of recordings in other parts is not.
+    """
     segments = space.problem.of("train")
     found = space.residual(starts, segments)
     best = int(np.argmin(np.sum(found**2, axis=1)))
     begun = Fit.of(space, starts[best], found[best], jacobian)
+    if len(jacobian) != len(begun.residual):
+        begun = Fit.at(space, begun.z, segments, is_rough=True)
     near, some = polish_on_some(replace(begun, is_rough=True), segments, 6)
     return _to_all(near, some)
 
 
 def _start_without(start: Start, gone: Sequence[int]) -> Start:
-    """Return the derivative at a vector in which some coordinates are 0, without those."""
+    """Return a derivative without some coordinates: exact at a vector in which those are 0."""
     priors = [len(start.jacobian) - start.z.size + index for index in gone]
     kept = np.delete(np.delete(start.jacobian, gone, axis=1), priors, axis=0)
     return Start(np.delete(start.z, gone), kept)

@@ -21,6 +21,8 @@ _LOOKED = 0.3
 """Of that, at which is looked."""
 _PLAINLY = 20.0
 """Twice what it takes off the cost, at least; in mean squares of what is left, if that is more."""
+_NEARLY = 0.5
+"""Of that, which a few steps with one derivative take off of what a fit does."""
 
 
 def creep_of(subject: Subject) -> tuple[BaseParameter, ...]:
@@ -51,7 +53,7 @@ def with_creep(done: BaseFits, creep: tuple[BaseParameter, ...]) -> BaseFits:
     if _expected(done, space.residual([start], train)[0]) < plainly:
         return done
     down = descend(space, [start], done.whole.jacobian, train, done.whole.z.size)
-    if 2.0 * (done.whole.cost - down.cost) < plainly:
+    if 2.0 * (done.whole.cost - down.cost) < _NEARLY * plainly:
         return done
     found = fit_with(space, done, down.z[done.whole.z.size :])
     return found if 2.0 * (done.whole.cost - found.whole.cost) > plainly else done

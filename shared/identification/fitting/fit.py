@@ -168,9 +168,8 @@ def go_down(
 
 
 def descend(
-    space: Space, starts: list[Float64], kept: Float64, segments: tuple[int, ...], known: int,
-    factors: tuple[float, ...] = BOLD,
-) -> Fit:  # fmt: skip
+    space: Space, starts: list[Float64], kept: Float64, segments: tuple[int, ...], known: int
+) -> Fit:
     """Go down from the best of some starts with a derivative of which part is known.
 
     Args:
@@ -179,14 +178,13 @@ def descend(
         kept: float64[at least M, at least ``known``], a derivative; of its rows the first M.
         segments: recordings to fit to.
         known: so many columns of it are.
-        factors: of the damping, tried at once.
     """
     found = space.residual(starts, segments)
     costs = 0.5 * np.sum(found**2, axis=1)
     best = int(np.argmin(costs))
     z, residual = starts[best], found[best]
     jacobian = widened(space, z, kept, segments, known)
-    return go_down(Fit.of(space, z, residual, jacobian), segments, factors)
+    return go_down(Fit.of(space, z, residual, jacobian), segments, BOLD)
 
 
 def widened(

@@ -24,7 +24,7 @@ from shared.identification.search.judging import judged
 from shared.identification.search.look import look
 from shared.identification.search.outlook import hopeless
 from shared.identification.search.rivals import is_rival, simplest
-from shared.identification.search.screen import Screened
+from shared.identification.search.screen import Screened, is_steady
 from shared.identification.search.searched import (
     Model,
     Search,
@@ -194,7 +194,10 @@ def _begun_anew(found: Search, one: Tried, train: tuple[int, ...]) -> Tried:
     """
     begins = (found.current.z, found.nominal.with_causes_of(found.current))
     starts = [np.r_[z, one.screened.start] for z in begins]
-    fit = polish_better(one.fit, found.parts.space.problem, starts, train, _AFRESH)
+    problem = found.problem
+    is_all_over = all(is_steady(problem.subject, each) for each in one.fit.space.candidates)
+    parts = found.parts.space.problem if is_all_over else problem
+    fit = polish_better(one.fit, parts, starts, train, _AFRESH)
     if fit is one.fit:
         return one
     return _tried(found, one.screened, fit, one.is_event)

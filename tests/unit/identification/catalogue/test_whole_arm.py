@@ -167,17 +167,22 @@ def test_a_payload_beside_the_tools_centre_turns_as_one_that_is_welded_there(tmp
 
 
 def test_what_moves_the_tools_centre_without_a_mass_is_no_harder_to_turn(subject: Subject):
-    seen: list[np.ndarray] = []
+    def turns(mass: float, place: str) -> float:
+        seen: list[float] = []
 
-    def enter(row: Row) -> None:
-        before = row.field("body_inertia").copy()
-        for mass in (0.0, 1e-4, 0.3):
-            payload.EFFECT.enter(row, payload.OFF_CENTRE, np.array([mass, 0.01, 0.0, 0.02]))
-            seen.append(row.field("body_inertia").sum() - before.sum())
+        def enter(row: Row) -> None:
+            size = [mass] if place == "" else [mass, 0.01, 0.0, 0.02]
+            payload.EFFECT.enter(row, place, np.array(size))
+            seen.append(row.field("body_inertia")[row.tool_body()].sum())
 
-    subject.nominal.run([(enter, recorded([0.0, 0.0, 0.0], seconds=0.1))])
-    assert seen[0] == pytest.approx(0.0)
-    assert seen[1] < 1e-3 < seen[2]
+        subject.nominal.run([(enter, recorded([0.0, 0.0, 0.0], seconds=0.1))])
+        return seen[0]
+
+    more = [turns(mass, payload.OFF_CENTRE) - turns(mass, "") for mass in (0.0, 1e-4, 0.3)]
+    assert more[0] == pytest.approx(0.0, abs=1e-12)
+    assert more[1] < 1e-5
+    # 0.5 * 0.3 / 0.8 kg, as far apart as moves the centre by (0.01, 0, 0.02) m; about three axes
+    assert more[2] == pytest.approx(2.0 * 0.1875 * (0.01**2 + 0.02**2) * (0.8 / 0.3) ** 2, rel=0.01)
 
 
 def test_where_the_centre_comes_to_lie_is_the_same_on_a_base_that_gives():

@@ -14,10 +14,12 @@ from shared.identification.fitting.base import (
     BaseFits,
     _from_elsewhere,  # pyright: ignore[reportPrivateUsage]
     _usual_power,  # pyright: ignore[reportPrivateUsage]
+    fit_base,
+    fit_with,
     fit_without,
 )
 from shared.identification.fitting.cmaes import minimize
-from shared.identification.fitting.fit import Fit, Start, polish
+from shared.identification.fitting.fit import Fit, Start, polish, widened
 from shared.identification.fitting.parameters import base_parameters, enter_base
 from shared.identification.fitting.problem import Problem
 from shared.identification.fitting.space import Space
@@ -117,6 +119,47 @@ def test_what_is_taken_out_of_a_base_is_taken_out_of_the_derivative_at_the_nomin
     assert found.nominal.jacobian == pytest.approx(wanted)
     assert found.nominal.z == pytest.approx(np.zeros(space.size))
     assert found.whole.cost > whole.cost
+
+
+def test_of_a_derivative_only_what_is_not_known_is_found_anew(tmp_path: Path):
+    problem = planted(tmp_path)
+    parameters = tuple(replace(each, prior=0.5) for each in problem.parameters)
+    fewer, space = (
+        Space(replace(problem, parameters=kept)) for kept in (parameters[:-2], parameters)
+    )
+    z, train = np.zeros(space.size), problem.of("train")
+    _, kept = fewer.jacobian(z[:-2], train)
+    wanted = space.jacobian(z, train, is_rough=True)[1]
+    assert widened(space, z, kept, train, fewer.size) == pytest.approx(wanted)
+
+
+def test_a_base_with_more_parameters_comes_further_down(tmp_path: Path):
+    problem = planted(tmp_path)
+    fewer, space = (
+        Space(replace(problem, parameters=kept))
+        for kept in (problem.parameters[:-1], problem.parameters)
+    )
+    rng = np.random.default_rng(0)
+    done = fit_base(fewer, rng)
+    found = fit_with(space, done, np.array([0.1]))
+    wanted = fit_base(space, rng)
+    assert found.whole.cost == pytest.approx(wanted.whole.cost, rel=1e-2, abs=1.0)
+    assert found.whole.cost < 0.5 * done.whole.cost
+    assert found.parts.z.size == found.nominal.z.size == space.size
+
+
+def test_a_derivative_of_other_parts_is_taken_anew(tmp_path: Path):
+    problem = planted(tmp_path)
+    gone = [1, 3]
+    kept = tuple(each for index, each in enumerate(problem.parameters) if index not in gone)
+    full, space = Space(problem), Space(replace(problem, parameters=kept))
+    whole = Fit.at(full, np.zeros(full.size), problem.of("train"))
+    at_nominal = Start(np.zeros(full.size), full.jacobian(np.zeros(full.size), (0,))[1])
+    in_parts = Space(replace(problem, parameters=kept).in_parts(WINDOW))
+    found = fit_without(space, BaseFits(at_nominal, whole, whole), gone)
+    assert len(found.parts.residual) == len(
+        in_parts.residual([np.zeros(space.size)], in_parts.problem.of("train"))[0]
+    )
 
 
 def test_without_repeats_a_floor_under_torques_is_what_is_usual_block_by_block():

@@ -106,11 +106,19 @@ def test_of_several_starts_the_best_one_on_some_short_parts_is_followed_in_whole
 
 @pytest.mark.usefixtures("is_long")
 def test_a_fit_is_kept_if_no_start_leads_further_down_on_some_short_parts(
-    problem: Problem, whole: Space
+    problem: Problem, whole: Space, monkeypatch: pytest.MonkeyPatch
 ):
     train = whole.problem.of("train")
     good = polish(whole, np.zeros(whole.size), train, 8)
+    asked: list[tuple[int, ...]] = []
+
+    def seen(space: Space, start: np.ndarray, segments: tuple[int, ...], steps: int) -> Fit:
+        asked.append(segments)
+        return polish(space, start, segments, steps)
+
+    monkeypatch.setattr("shared.identification.fitting.long.polish", seen)
     assert polish_better(good, problem, [np.full(whole.size, 0.05)], train, 8) is good
+    assert train not in asked
 
 
 def test_of_short_recordings_each_start_is_followed_in_whole_ones(problem: Problem, whole: Space):
