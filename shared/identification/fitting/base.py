@@ -7,7 +7,7 @@ import numpy as np
 
 from shared.identification.dataset.types import Float64
 from shared.identification.fitting.cmaes import minimize
-from shared.identification.fitting.fit import ENOUGH, Fit, Start, go_down, polish, widened
+from shared.identification.fitting.fit import ENOUGH, Fit, Start, best_of, go_down, polish, widened
 from shared.identification.fitting.long import polish_on_some
 from shared.identification.fitting.space import Space
 from shared.identification.noise.floor import Noise
@@ -141,17 +141,18 @@ def fit_with(space: Space, done: BaseFits, start: Float64) -> BaseFits:
         start: float64[K], where they begin.
     """
     parts, origin, known = _on_parts(space), np.zeros(space.size), done.nominal.z.size
-
-    def at(space: Space, z: Float64, kept: Float64) -> Float64:
-        return widened(space, z, kept, space.problem.of("train"), known)
-
-    begun, best = (np.r_[fit.z, start] for fit in (done.parts, done.whole))
-    nominal = Start(origin, at(parts, origin, done.nominal.jacobian))
-    near = _fit_from(parts, [begun], at(parts, begun, done.parts.jacobian))
+    pieces = parts.problem.of("train")
+    at_nominal = widened(parts, origin, done.nominal.jacobian, pieces, known)
+    begun = np.r_[done.parts.z, start]
+    near = _fit_from(parts, [begun], widened(parts, begun, done.parts.jacobian, pieces, known))
     whole = near
     if parts.problem is not space.problem:
-        whole = _fit_from(space, [best, near.z], at(space, best, done.whole.jacobian))
-    return BaseFits(nominal, near, replace(whole, starts_agree=done.whole.starts_agree))
+        best = np.r_[done.whole.z, start]
+        train = space.problem.of("train")
+        jacobian = widened(space, best, done.whole.jacobian, train, known)
+        whole = _fit_from(space, [best, near.z], jacobian)
+    whole = replace(whole, starts_agree=done.whole.starts_agree)
+    return BaseFits(Start(origin, at_nominal), near, whole)
 
 
 def _fit_from(space: Space, starts: list[Float64], jacobian: Float64) -> Fit:
@@ -160,11 +161,10 @@ def _fit_from(space: Space, starts: list[Float64], jacobian: Float64) -> Fit:
     One of recordings in other parts is not.
     """
     segments = space.problem.of("train")
-    found = space.residual(starts, segments)
-    best = int(np.argmin(np.sum(found**2, axis=1)))
-    begun = Fit.of(space, starts[best], found[best], jacobian)
-    if len(jacobian) != len(begun.residual):
-        begun = Fit.at(space, begun.z, segments, is_rough=True)
+    z, residual = best_of(space, starts, segments)
+    begun = Fit.of(space, z, residual, jacobian)
+    if len(jacobian) != len(residual):
+        begun = Fit.at(space, z, segments, is_rough=True)
     near, some = polish_on_some(replace(begun, is_rough=True), segments, 6)
     return _to_all(near, some)
 

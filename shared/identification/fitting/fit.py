@@ -179,12 +179,18 @@ def descend(
         segments: recordings to fit to.
         known: so many columns of it are.
     """
-    found = space.residual(starts, segments)
-    costs = 0.5 * np.sum(found**2, axis=1)
-    best = int(np.argmin(costs))
-    z, residual = starts[best], found[best]
+    z, residual = best_of(space, starts, segments)
     jacobian = widened(space, z, kept, segments, known)
     return go_down(Fit.of(space, z, residual, jacobian), segments, BOLD)
+
+
+def best_of(
+    space: Space, starts: list[Float64], segments: tuple[int, ...]
+) -> tuple[Float64, Float64]:
+    """Return the best of some vectors on segments, float64[n], and its residual, float64[M + n]."""
+    found = space.residual(starts, segments)
+    best = int(np.argmin(np.sum(found**2, axis=1)))
+    return starts[best], found[best]
 
 
 def widened(
