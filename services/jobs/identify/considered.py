@@ -116,7 +116,7 @@ def unexplained(verdict: Verdict, evidence: Evidence) -> Html:
             tag("b", words.unexplained_mark(number)),
             left.where,
             left.trajectory,
-            f"{words.number_text(left.begin)} to {words.number_text(left.end)}",
+            f"{words.moment_text(left.begin)} to {words.moment_text(left.end)}",
             words.when_text(left),
             words.quantity_text(left.size, left.unit),
             words.number_text(left.times_noise, 2),

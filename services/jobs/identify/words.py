@@ -45,6 +45,11 @@ def number_text(value: float, digits: int = 3) -> str:
     return text.replace("-", MINUS)
 
 
+def moment_text(seconds: float) -> str:
+    """Return a moment of a recording, to a hundredth of a second."""
+    return f"{round(seconds, 2) + 0.0:.6g}".replace("-", MINUS)
+
+
 def quantity_text(value: float, unit: str, interval: Interval | None = None) -> str:
     """Return a quantity and its 95 % interval: ``30 ms (29.8 to 30.2)``."""
     ends = () if interval is None else (interval.low, interval.high)
@@ -120,8 +125,8 @@ def unexplained_text(left: Unexplained, held_out: HeldOut) -> str:
     """Return in a line where something is left, and how much."""
     size = quantity_text(left.size, left.unit)
     return (
-        f"{left.where}, {left.trajectory} from {number_text(left.begin)} to "
-        f"{number_text(left.end)} s, {when_text(left)}: {size}, "
+        f"{left.where}, {left.trajectory} from {moment_text(left.begin)} to "
+        f"{moment_text(left.end)} s, {when_text(left)}: {size}, "
         f"{number_text(left.times_noise)} times {floor_name(held_out)}"
     )
 

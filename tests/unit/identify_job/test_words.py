@@ -8,6 +8,7 @@ import pytest
 from services.jobs.identify.words import (
     cause_text,
     held_out_text,
+    moment_text,
     number_text,
     quantity_text,
     share_text,
@@ -120,6 +121,21 @@ def test_a_cause_is_told_by_the_number_that_is_most_surely_not_nothing() -> None
 )
 def test_numbers_have_no_powers_of_ten(value: float, text: str) -> None:
     assert number_text(value) == text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.0000576, "0"),
+        (-0.0000576, "0"),
+        (0.3666, "0.37"),
+        (16.0, "16"),
+        (1234.567, "1234.57"),
+        (-0.25, "\N{MINUS SIGN}0.25"),
+    ],
+)
+def test_moments_are_told_to_a_hundredth_of_a_second(seconds: float, text: str) -> None:
+    assert moment_text(seconds) == text
 
 
 def test_shares_are_in_percent() -> None:
