@@ -43,6 +43,7 @@ NO_ENTRANCES: dict[str, str] = {
     "services.jobs.chaos.clock:step": _CHAOS,
     "services.jobs.chaos.lies:with_other_shape": _CHAOS,
     "services.jobs.chaos.records:_read": _CHAOS,
+    "services.jobs.chaos.robot.stand_in:StandIn.conduct_said": _CHAOS,
     "services.jobs.chaos.tail:_event": _CHAOS,
     "services.jobs.tournament.files:write_results": _OWN,
     "services.jobs.tournament.ratings:bouts_of": "makes the table from the ledger; reads no bytes",
