@@ -21,13 +21,15 @@ def stand_with(folder: Path, game: str) -> Stand:
 
 
 def views_until(stand: Stand, end: str) -> list[ParticipantView]:
-    """Walk to a step; return every view on the way."""
+    """Walk to a step, as who answers what the page shows; return every view on the way."""
     views: list[ParticipantView] = []
 
     def is_there() -> bool:
-        if stand.pages.participant is not None:
-            views.append(stand.pages.participant)
-        stand.help_on()
+        view, step = stand.pages.participant, stand.session.step
+        if view is not None:
+            views.append(view)
+        if step is None or (view is not None and view.step == step.id):
+            stand.help_on()
         return stand.session.is_over or (
             stand.session.step is not None and stand.session.step.id == end
         )
