@@ -24,7 +24,7 @@ from shared.clock import SystemClock
 from shared.config.site import nearest
 from shared.errors import ConfigError
 from shared.identification.catalogue import effects
-from shared.identification.dataset.caveats import in_words
+from shared.identification.dataset.caveats import MIXED_UP, in_words
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.dataset.types import Dataset
 from shared.identification.find import identify
@@ -70,7 +70,7 @@ def main(argv: Sequence[str]) -> int:
         if not found.resume and steps.exists():
             shutil.rmtree(steps)
         steps.mkdir(exist_ok=True)
-        display.say(_opening(dataset, out))
+        display.say(opening(dataset, out))
         try:
             with display:
                 finding = identify(
@@ -203,13 +203,16 @@ def _out_folder(dataset: Path, out: Path | None) -> Path:
     return folder
 
 
-def _opening(dataset: Dataset, out: Path) -> str:
+def opening(dataset: Dataset, out: Path) -> str:
+    """Return what is going to be worked on, and what is better mended before that."""
     train, test = len(dataset.train), len(dataset.test)
     seconds = sum(each.duration for each in dataset.trajectories)
-    return (
+    first = (
         f"{len(dataset.joints)} joints, {train} recordings to fit and {test} held out, "
         f"{seconds:.0f} s in all, {len(in_words(dataset.caveats))} caveats; writes to {out}"
     )
+    mixed = in_words([each for each in dataset.caveats if each.name in MIXED_UP])
+    return "\n".join([first, *(f"beware: {each}" for each in mixed)])
 
 
 def _told(argv: Sequence[str]) -> list[str]:

@@ -1,7 +1,7 @@
 """What limits a usable recording: named, with the value and what to do."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -28,6 +28,14 @@ FASTER: Final = 1.5
 """Times the fastest motion that is fitted to: what is held out says nothing of the fit then."""
 ALIKE: Final = 0.05
 """Share of a command's own movement by which two commands differ that are nearly the same."""
+_MOVES: Final = 0.01
+"""Standard deviation of what moves at all (rad, m)."""
+_FOLLOWS: Final = 0.95
+"""Correlation of where a joint is with where it is sent, if it surely goes there."""
+_FOLLOWS_NOT: Final = 0.5
+"""The same, if it surely does not."""
+MIXED_UP: Final = ("other_way", "other_joint")
+"""Caveats of data that is hardly what was recorded."""
 JUMP_SPEED: Final = 10.0
 """Of a tracker (m/s)."""
 JUMP: Final = 0.03
@@ -166,6 +174,42 @@ def of_joints(trajectory: Trajectory, joints: Sequence[str]) -> list[Caveat]:
                     "(correlation under 0.9): is it of another joint, delayed, or filtered?"
                 )))  # fmt: skip
     return found
+
+
+def of_commands(name: str, sent: Mapping[str, Float64], got: Mapping[str, Float64]) -> list[Caveat]:
+    """Return what is strange of where joints go, beside where they are sent.
+
+    Args:
+        name: of the recording.
+        sent: float64[T] of each joint, the position in force at each reading.
+        got: float64[T] of each joint, what was read.
+    """
+    found: list[Caveat] = []
+    for joint, own in sent.items():
+        like = _likeness(own, got[joint])
+        others = {each: _likeness(sent[each], got[joint]) for each in sent if each != joint}
+        if like < -_FOLLOWS:
+            found.append(Caveat("other_way", name, (
+                f"joint {joint!r} goes the other way than its command (correlation "
+                f"{like:.2f}): turn the sign of one of them round, or of the joint's axis in the "
+                "model file, unless its actuator has a negative gear"
+            )))  # fmt: skip
+        elif like < _FOLLOWS_NOT and max(others.values(), default=0.0) > _FOLLOWS:
+            other = max(others, key=lambda each: others[each])
+            found.append(Caveat("other_joint", name, (
+                f"joint {joint!r} follows the command of {other!r} (correlation "
+                f"{others[other]:.2f}) and not its own ({like:.2f}): see whether their columns are "
+                "mixed up"
+            )))  # fmt: skip
+    return found
+
+
+def _likeness(one: Float64, other: Float64) -> float:
+    """Return the correlation of two series; 0 where one hardly moves."""
+    first, second = one - one.mean(), other - other.mean()
+    if min(float(first.std()), float(second.std())) < _MOVES:
+        return 0.0
+    return float(first @ second / (np.linalg.norm(first) * np.linalg.norm(second)))
 
 
 def of_tracker(trajectory: Trajectory) -> list[Caveat]:

@@ -137,7 +137,7 @@ def _trajectory(
         checks.check_finite(command, actuators)
         sent = np.stack([command.columns[each] for each in actuators], axis=1)
         if manifest.control == "position":
-            _check_units(recording, joints, q)
+            found += _check_commands(name, recording, joints, q)
     speed = surely_moving(times, q) if qd is None else logged_velocities(times, q, qd)
     made = Trajectory(
         name, entry.split, entry.repeats,
@@ -160,13 +160,15 @@ def _trajectory(
     return made, found
 
 
-def _check_units(recording: Recording, joints: Names, q: Float64) -> None:
+def _check_commands(name: str, recording: Recording, joints: Names, q: Float64) -> list[Caveat]:
+    """Check that joints go where they are sent, as far as commands are named like them."""
     command, readings = recording.command, recording.readings
-    rows = np.searchsorted(command.t_ns, readings.t_ns, side="right") - 1
-    for index, joint in enumerate(joints):
-        if joint in command.columns:
-            sent = command.columns[joint][np.maximum(rows, 0)]
-            checks.check_unit(command.path, joint, sent, q[:, index])
+    rows = np.maximum(np.searchsorted(command.t_ns, readings.t_ns, side="right") - 1, 0)
+    sent = {each: command.columns[each][rows] for each in joints if each in command.columns}
+    got = {each: q[:, index] for index, each in enumerate(joints)}
+    for joint, positions in sent.items():
+        checks.check_unit(command.path, joint, positions, got[joint])
+    return caveats.of_commands(name, sent, got)
 
 
 def _positions(

@@ -210,3 +210,37 @@ def test_what_recordings_share_but_for_its_numbers_is_said_once():
         "nothing is known",
         "r0: late by 0 ms (much the same: 6 more)",
     )
+
+
+def test_a_joint_that_goes_the_other_way_than_its_command_is_told(tmp_path):
+    folder = written(tmp_path)
+    joints = motion(1)
+    rewritten(folder, 1, joints, command(joints) | {"elbow": -joints["q_elbow"]})
+    found = the(folder, "other_way")
+    assert found.trajectory == "two"
+    assert "joint 'elbow' goes the other way than its command (correlation -1.00)" in found.text
+
+
+def test_joints_that_follow_one_another_s_commands_are_told(tmp_path):
+    folder = written(tmp_path)
+    joints = motion(1)
+    times = (joints["t_ns"] - joints["t_ns"][0]) / 1e9
+    joints["q_elbow"] = 0.2 * np.sin(7.0 * times)
+    joints["qd_elbow"] = 1.4 * np.cos(7.0 * times)
+    mixed = {"shoulder": joints["q_elbow"], "elbow": joints["q_shoulder"]}
+    rewritten(folder, 1, joints, command(joints) | mixed)
+    found = [each for each in read_dataset(folder).caveats if each.name == "other_joint"]
+    assert [each.trajectory for each in found] == ["two", "two"]
+    assert "joint 'shoulder' follows the command of 'elbow' (correlation 1.00)" in found[0].text
+    assert "see whether their columns are mixed up" in found[0].text
+
+
+def test_joints_that_move_alike_or_lag_are_told_nothing_of(tmp_path):
+    folder = written(tmp_path)
+    joints = motion(1)
+    joints["q_elbow"], joints["qd_elbow"] = joints["q_shoulder"], joints["qd_shoulder"]
+    sent = command(joints)
+    late = {name: np.r_[np.full(20, sent[name][0]), sent[name][:-20]] for name in JOINTS}
+    rewritten(folder, 1, joints, sent | late)
+    names = {each.name for each in read_dataset(folder).caveats}
+    assert not names & {"other_way", "other_joint"}
