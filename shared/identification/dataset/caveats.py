@@ -187,15 +187,18 @@ def of_commands(name: str, sent: Mapping[str, Float64], got: Mapping[str, Float6
     found: list[Caveat] = []
     for joint, own in sent.items():
         like = _likeness(own, got[joint])
-        others = {each: _likeness(sent[each], got[joint]) for each in sent if each != joint}
         if like < -_FOLLOWS:
             found.append(Caveat("other_way", name, (
                 f"joint {joint!r} goes the other way than its command (correlation "
                 f"{like:.2f}): turn the sign of one of them round, or of the joint's axis in the "
                 "model file, unless its actuator has a negative gear"
             )))  # fmt: skip
-        elif like < _FOLLOWS_NOT and max(others.values(), default=0.0) > _FOLLOWS:
-            other = max(others, key=lambda each: others[each])
+            continue
+        if like >= _FOLLOWS_NOT:
+            continue
+        others = {each: _likeness(sent[each], got[joint]) for each in sent if each != joint}
+        other = max(others, key=lambda each: others[each], default=joint)
+        if others.get(other, 0.0) > _FOLLOWS:
             found.append(Caveat("other_joint", name, (
                 f"joint {joint!r} follows the command of {other!r} (correlation "
                 f"{others[other]:.2f}) and not its own ({like:.2f}): see whether their columns are "
