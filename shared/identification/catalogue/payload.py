@@ -22,7 +22,10 @@ _REACH = 0.5
 
 
 class Payload:
-    """A mass at the tool's centre of mass, or one beside it, which then moves that."""
+    """A mass like the tool at its centre, or one beside it, which then moves that.
+
+    What is beside it may be of any size: how hard that is to turn by itself is a number of its own.
+    """
 
     name = "payload"
     title = "the tool is heavier than the model says"
@@ -37,12 +40,12 @@ class Payload:
         return ("", OFF_CENTRE) if _hangs(subject) and _axes(subject) else ("",)
 
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
-        """Return the mass that the model lacks, and by how much it moves the centre of all."""
+        """Return the mass that the model lacks; beside the centre how it moves that, and turns."""
         mass = Quantity("mass", "kg", 0.0, 10.0, probe=0.3)
         if place != OFF_CENTRE:
             return (mass,)
         moved = (Quantity(f"centre_{axis}", "m", -0.2, 0.2, probe=0.01) for axis in _axes(subject))
-        return (mass, *moved)
+        return (mass, *moved, Quantity("inertia", "kg m^2", 0.0, 0.5, probe=1e-3))
 
     def structure(self, subject: Subject, place: str) -> Structure:
         """Return nothing: the body is there."""
@@ -52,7 +55,7 @@ class Payload:
         """Make the tool's body heavier, its radius of gyration unchanged.
 
         The springs of a counterbalanced arm, or a controller that carries its weight, do not know
-        of it: there it pulls by itself. Beside the centre it is harder to turn, too (Steiner).
+        of it: there it pulls by itself. Beside the centre it is a body of its own (Steiner).
         """
         body, added = row.tool_body(), float(values[0])
         mass = row.field("body_mass")
@@ -60,15 +63,16 @@ class Payload:
         if is_weightless(row.model):
             row.forces[body] = (0.0, 0.0, -_GRAVITY * added)
         grown = (mass[body] + added) / mass[body]
-        row.field("body_inertia")[body] *= grown
         mass[body] *= grown
         if row.model.body_gravcomp[body]:
             row.field("body_gravcomp")[body] /= grown
-        if place == OFF_CENTRE:
-            moved = np.zeros(3)
-            moved[np.array(_turned(row.plant))] = values[1:]
-            row.field("body_ipos")[body] += moved
-            add_inertia(row, body, _apart(own, added, moved))
+        if place != OFF_CENTRE:
+            row.field("body_inertia")[body] *= grown
+            return
+        moved = np.zeros(3)
+        moved[np.array(_turned(row.plant))] = values[1:-1]
+        row.field("body_ipos")[body] += moved
+        add_inertia(row, body, _apart(own, added, moved) + float(values[-1]) * np.eye(3))
 
 
 def _apart(own: float, added: float, moved: Float64) -> Float64:

@@ -17,8 +17,8 @@ from shared.identification.arm.subject import Subject, recorded_of, subject_of
 from shared.identification.catalogue import effects
 from shared.identification.dataset.types import Dataset, Float64, with_timestep
 from shared.identification.effect import Effect, Quantity
-from shared.identification.fitting.creep import creep_of
 from shared.identification.fitting.parameters import base_parameters
+from shared.identification.fitting.shown import if_shown
 from shared.identification.verdict import Cause, Verdict
 from shared.sim.parameters import Measured, dump_parameters, load_parameters
 from shared.sim.plant.export import patched_xml
@@ -189,7 +189,7 @@ def _entered(dataset: Dataset, rollouts: Rollouts, entry: Callable[[Row], None])
 
 
 def _enter_base(row: Row, subject: Subject, verdict: Verdict) -> None:
-    parameters = (*base_parameters(subject), *creep_of(subject))
+    parameters = (*base_parameters(subject), *if_shown(subject))
     known = {parameter.name: parameter for parameter in parameters}
     for value in verdict.base:
         if value.name not in known:

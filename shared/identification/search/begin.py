@@ -16,10 +16,10 @@ from shared.identification.fitting.base import (
     fit_without,
     floor_from_base,
 )
-from shared.identification.fitting.creep import creep_of, with_creep
 from shared.identification.fitting.fit import Fit
 from shared.identification.fitting.parameters import BaseParameter, base_parameters, bends
 from shared.identification.fitting.problem import BLOCK, Problem, Span
+from shared.identification.fitting.shown import if_shown, with_shown
 from shared.identification.fitting.space import Space
 from shared.identification.gate.held_out import stretches
 from shared.identification.noise.floor import noise_of
@@ -72,8 +72,8 @@ def begin(
     subject = subject_of(dataset, threads=threads)
     noise = noise_of(dataset, BLOCK, subject.starts, subject.nominal)
     released = known = base_parameters(subject)
-    creep = creep_of(subject)
-    if fits is not None and not {each.name for each in (*known, *creep)} >= set(fits.names):
+    shown = if_shown(subject)
+    if fits is not None and not {each.name for each in (*known, *shown)} >= set(fits.names):
         fits = None
     candidates, ruled_out = candidates_of(catalogue, subject, without)
     pushed = {each.trajectory for each in aside}
@@ -87,10 +87,11 @@ def begin(
             noise = no_more(noise, Space(full, lacks))
         full = replace(full, noise=noise)
     if fits is not None:
-        known = tuple(each for each in (*known, *creep) if each.name in fits.names)
+        by_name = {each.name: each for each in (*known, *shown)}
+        known = tuple(by_name[name] for name in fits.names)
     problem = replace(full, parameters=known)
     progress("base fit", 0.0, f"{len(known)} parameters" + ("" if fits is None else ", kept"))
-    step = _Step(released, creep, candidates, seed, progress, fits)
+    step = _Step(released, shown, candidates, seed, progress, fits)
     is_pushed = fits is not None and fits.is_torque
     done, family = (None, None) if is_pushed else step.from_base(problem, rng)
     is_new = fits is None and family is None and lacks and not noise.is_measured
@@ -115,7 +116,7 @@ class _Step:
     """What it takes to fit a base, and what the model file lacks of drives."""
 
     released: tuple[BaseParameter, ...]
-    creep: tuple[BaseParameter, ...]
+    shown: tuple[BaseParameter, ...]
     candidates: tuple[Candidate, ...]
     seed: int
     progress: Progress
@@ -127,7 +128,7 @@ class _Step:
         """Return the fits; parameters that they bend beyond belief are not released."""
         space, fits = Space(problem), self.fits
         done = (
-            with_creep(fit_base(space, rng), self.creep) if fits is None else fit_again(space, fits)
+            with_shown(fit_base(space, rng), self.shown) if fits is None else fit_again(space, fits)
         )
         problem = done.whole.space.problem
         if lacking(done.whole.space, self.candidates):

@@ -21,6 +21,8 @@ from shared.sim.plant.row import Row
 from tests.arms import JOINTS, make_plant, make_subject, recorded, replay, write_arm
 
 EFFECTS: tuple[Effect, ...] = (gravity_tilt.EFFECT, base_compliance.EFFECT, payload.EFFECT)
+_BALL = 4e-4
+"""How hard something to carry is to turn by itself (kg m^2)."""
 
 
 @pytest.fixture(scope="module")
@@ -128,17 +130,17 @@ def test_a_payload_beside_the_tools_centre_moves_it(subject: Subject):
     place = payload.OFF_CENTRE
     assert payload.EFFECT.places(subject) == ("", place)
     names = [each.name for each in payload.EFFECT.quantities(subject, place)]
-    assert names == ["mass", "centre_x", "centre_y", "centre_z"]
+    assert names == ["mass", "centre_x", "centre_y", "centre_z", "inertia"]
     still = recorded([0.0, 0.0, 0.0], seconds=3.0)
     plain = replay(subject, still)
-    found = replay(subject, still, payload.EFFECT, place, [0.5, 0.1, 0.0, 0.0])
+    found = replay(subject, still, payload.EFFECT, place, [0.5, 0.1, 0.0, 0.0, 0.0])
     # 1 kg at 0.25 m from the elbow instead of 0.5 kg at 0.15 m
     lever = 1.0 * 0.25 - 0.5 * 0.15
     assert (found.q[-1, 2] - plain.q[-1, 2]) * 200 == pytest.approx(9.81 * lever, rel=0.08)
 
 
 def test_a_payload_beside_the_tools_centre_turns_as_one_that_is_welded_there(tmp_path: Path):
-    # of the forearm's own shape, 0.5 kg at (0.1, 0.06, -0.04) m from the centre of its 0.5 kg
+    # a ball of 0.5 kg at (0.1, 0.06, -0.04) m from the centre of the forearm's 0.5 kg
     path = write_arm(tmp_path)
     plant = mjcf(path, "position", JOINTS, JOINTS, "tool")
     own = make_subject(plant).nominal.model
@@ -149,8 +151,8 @@ def test_a_payload_beside_the_tools_centre_turns_as_one_that_is_welded_there(tmp
         return " ".join(f"{value:.17g}" for value in values)
 
     inertial = (
-        f'<inertial mass="0.5" pos="{numbers(at + beside)}" quat="{numbers(own.body_iquat[fore])}"'
-        f' diaginertia="{numbers(own.body_inertia[fore])}"/>'
+        f'<inertial mass="0.5" pos="{numbers(at + beside)}" '
+        f'diaginertia="{numbers(np.full(3, _BALL))}"/>'
     )
     welded = tmp_path / "welded.xml"
     text = path.read_text()
@@ -159,30 +161,32 @@ def test_a_payload_beside_the_tools_centre_turns_as_one_that_is_welded_there(tmp
     welded.write_text(f'{text[:end]}<body name="held">{inertial}</body>{text[end:]}')
     fast = recorded(swing, seconds=2.0)
     wanted = replay(make_subject(mjcf(welded, "position", JOINTS, JOINTS, "tool")), fast).q
-    size = [0.5, *(0.5 * beside)]  # the centre of both is half-way
+    size = [0.5, *(0.5 * beside), _BALL]  # the centre of both is half-way
     found = replay(make_subject(plant), fast, payload.EFFECT, payload.OFF_CENTRE, size).q
-    alone = replay(make_subject(plant), fast, payload.EFFECT, payload.OFF_CENTRE, [0.5, 0, 0, 0]).q
+    alone = replay(make_subject(plant), fast, payload.EFFECT, payload.OFF_CENTRE, [0.5, *[0] * 4]).q
     assert np.abs(alone - wanted).max() > 2e-3
     np.testing.assert_allclose(found, wanted, atol=2e-5)
 
 
 def test_what_moves_the_tools_centre_without_a_mass_is_no_harder_to_turn(subject: Subject):
-    def turns(mass: float, place: str) -> float:
+    def turns(mass: float, inertia: float = 0.0) -> float:
         seen: list[float] = []
 
         def enter(row: Row) -> None:
-            size = [mass] if place == "" else [mass, 0.01, 0.0, 0.02]
-            payload.EFFECT.enter(row, place, np.array(size))
+            size = np.array([mass, 0.01, 0.0, 0.02, inertia])
+            payload.EFFECT.enter(row, payload.OFF_CENTRE, size)
             seen.append(row.field("body_inertia")[row.tool_body()].sum())
 
         subject.nominal.run([(enter, recorded([0.0, 0.0, 0.0], seconds=0.1))])
         return seen[0]
 
-    more = [turns(mass, payload.OFF_CENTRE) - turns(mass, "") for mass in (0.0, 1e-4, 0.3)]
+    tool = subject.nominal.model.body_inertia[subject.nominal.model.body("fore").id].sum()
+    more = [turns(mass) - tool for mass in (0.0, 1e-4, 0.3)]
     assert more[0] == pytest.approx(0.0, abs=1e-12)
     assert more[1] < 1e-5
     # 0.5 * 0.3 / 0.8 kg, as far apart as moves the centre by (0.01, 0, 0.02) m; about three axes
     assert more[2] == pytest.approx(2.0 * 0.1875 * (0.01**2 + 0.02**2) * (0.8 / 0.3) ** 2, rel=0.01)
+    assert turns(0.3, _BALL) - turns(0.3) == pytest.approx(3.0 * _BALL)
 
 
 def test_where_the_centre_comes_to_lie_is_the_same_on_a_base_that_gives():
@@ -191,7 +195,7 @@ def test_where_the_centre_comes_to_lie_is_the_same_on_a_base_that_gives():
     bends = Rollouts(pendulum.plant, base_compliance.EFFECT.structure(pendulum, ""), 1)
 
     def enter(row: Row) -> None:
-        payload.EFFECT.enter(row, payload.OFF_CENTRE, np.array([0.5, 0.1, 0.02]))
+        payload.EFFECT.enter(row, payload.OFF_CENTRE, np.array([0.5, 0.1, 0.02, 0.0]))
 
     row = bends.entered(enter, recorded([0.0, 0.0], seconds=0.1))
     tool = row.tool_body()

@@ -5,24 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shared.identification.fitting.base import BaseFits
-from shared.identification.fitting.creep import creep_of, with_creep
-from shared.identification.fitting.fit import Start, polish
+from shared.identification.fitting.creep import creep_of
 from shared.identification.fitting.parameters import enter_base
-from shared.identification.fitting.problem import Problem
-from shared.identification.fitting.space import Space
 from shared.sim.hidden.arms import ARMS
 from shared.sim.plant.row import Row
 from tests.arms import make_plant, make_subject, recorded
-from tests.measured import measure, problem_of
 
 _COMMAND = (0.5, 0.3, -0.5)
-
-
-def _fits(problem: Problem) -> BaseFits:
-    space, train = Space(problem), problem.of("train")
-    fit = polish(space, np.zeros(space.size), train, 4)
-    return BaseFits(Start(fit.z, fit.jacobian), fit, fit)
 
 
 def test_what_friction_holds_sticks_and_at_one_creeps_as_mujocos_own_does(tmp_path: Path):
@@ -42,11 +31,3 @@ def test_what_friction_holds_sticks_and_at_one_creeps_as_mujocos_own_does(tmp_pa
 @pytest.mark.parametrize("arm", ["torque2", "pr2"])
 def test_an_arm_without_friction_or_held_by_its_tool_has_none_that_creeps(arm: str):
     assert creep_of(make_subject(ARMS[arm].make())) == ()
-
-
-def test_joints_that_stick_are_left_to(tmp_path: Path):
-    """Where they do not: ``tests/integration/identification/test_plain_mujoco.py``."""
-    problem = problem_of(measure(tmp_path, np.random.default_rng(0)))
-    done = _fits(problem)
-    assert with_creep(done, creep_of(problem.subject)) is done
-    assert with_creep(done, ()) is done

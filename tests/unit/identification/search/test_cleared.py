@@ -13,7 +13,7 @@ from tests.measured import Enter, nothing
 from tests.searches import ELBOW, Searches
 
 _HELD = "mass elbow"
-_BASE, _LEFT = np.full(8, 200.0), np.full(8, 15.0)
+_BASE, _LEFT = np.full(4, 200.0), np.full(4, 15.0)
 
 
 def _heavier(row: Row) -> None:
@@ -43,8 +43,21 @@ def test_a_link_that_is_let_go_says_whether_it_is_to_be_doubted(
     assert is_open(found) == bool(doubted)
 
 
+def test_a_cause_is_told_beside_the_links_that_are_let_go(tmp_path: Path):
+    found = _doubted(tmp_path, nothing)
+    base, where = found.base, found.current.space.where(ELBOW)
+    clear(found, silent)
+    assert [each.name for each in found.problem.parameters][-1] == _HELD
+    for fit in (found.base, found.current):
+        assert fit.space.problem is found.problem
+        assert fit.jacobian.shape == (len(fit.residual), fit.space.size)
+    assert found.base.z.tolist() == [*base.z, 0.0]
+    assert found.current.space.where(ELBOW).start == where.start + 1
+    assert found.current.z[where.start] != 0.0
+
+
 def test_what_is_left_of_an_arm_without_doubts_may_be_too_much_as_well(tmp_path: Path):
     found = _doubted(tmp_path, nothing)
-    found.current_losses = np.full(8, 0.2 * 200.0)
+    found.current_losses = np.full(4, 0.2 * 200.0)
     clear(found, silent)
     assert found.doubted == (_HELD,)

@@ -376,7 +376,7 @@ def test_a_payload_beside_the_centre_and_an_encoders_zero_are_rivals_if_a_little
 ):
     zero = searches.tried(Candidate(ZERO, "elbow"), _BAD, _GOOD)
     apart = 0.01 * float((_BAD - _GOOD).mean())
-    heavy = searches.tried(Candidate(PAYLOAD, OFF_CENTRE), _BAD, _GOOD + apart, numbers=4)
+    heavy = searches.tried(Candidate(PAYLOAD, OFF_CENTRE), _BAD, _GOOD + apart, numbers=5)
     heavy = replace(heavy, fit=replace(heavy.fit, cost=zero.fit.cost))
     assert simplest([heavy, zero], np.random.default_rng(0)) == (zero, (heavy,))
     further = replace(heavy, losses=_GOOD + 5.0 * apart)
