@@ -57,7 +57,7 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
     word = _word(found, ties, left)
     sure = tuple(cause for cause, rivals in zip(accepted, found.rivals, strict=True) if not rivals)
     told = accepted if word == "unexplained" else sure
-    sentence = sentence_of(word, told, ties, held_out, left, found.is_only_like)
+    sentence = sentence_of(word, told, ties, held_out, left, found.is_only_like, found.doubted)
     far = far_from_file(found)
     return Conclusion(
         word=word,

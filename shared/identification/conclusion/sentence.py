@@ -20,6 +20,7 @@ def sentence_of(
     held_out: HeldOut,
     left: tuple[Unexplained, ...],
     is_only_like: bool = False,
+    doubted: tuple[str, ...] = (),
 ) -> str:
     """Return the verdict for people.
 
@@ -30,6 +31,7 @@ def sentence_of(
         held_out: how much is left.
         left: where.
         is_only_like: whether the causes stand in for a law that is not known.
+        doubted: numbers of links that are held, since the base went further than is believable.
     """
     floor = "the noise" if held_out.is_floor_measured else "what the base fit usually leaves"
     ratio = f"{held_out.base_fit:.2f} times {floor}"
@@ -49,8 +51,9 @@ def sentence_of(
         return f"Nothing to name: with its base fitted the simulation is at {told}."
     if word == "base_too_coarse":
         return (
-            f"The base model does not fit: {ratio} are left with links far from their known mass. "
-            "Release more of its parameters, or correct the model file, before looking for causes."
+            f"The base model does not fit: {ratio} are left with {listing(doubted)} as the model "
+            "file has it, and a fit that may change it goes further than is believable (30 %, "
+            "15 mm). Correct the links in the model file before looking for causes."
         )
     if causes:
         names = " and ".join(f"{label(cause)} ({_size(cause)})" for cause in causes)

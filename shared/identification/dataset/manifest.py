@@ -8,9 +8,9 @@ from typing import Any, Final, Literal
 import msgspec
 
 from shared.config import toml
-from shared.config.location import line_of
+from shared.config.located import read_toml
 from shared.config.site import nearest
-from shared.errors import IdentificationError
+from shared.errors import ConfigError, IdentificationError
 from shared.identification.dataset.types import Control, EncoderSide, Kind, Split
 
 FILE: Final = "dataset.toml"
@@ -19,10 +19,6 @@ MAX_BYTES: Final = 1 << 20
 MAX_TRAJECTORIES: Final = 200
 
 _NAME = re.compile(r"\w[\w.-]{0,99}\Z", re.ASCII)
-_UNKNOWN = re.compile(r"Object contains unknown field `(?P<field>[^`]*)`")
-_AT = re.compile(r" - at `\$(?P<path>[^`]*)`\Z")
-_ENTRY = re.compile(r"\.?trajectory\[(?P<index>\d+)\]")
-_HEADER = re.compile(r"\s*\[\[\s*trajectory\s*\]\]")
 
 
 class ModelTable(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -109,9 +105,9 @@ def read_manifest(path: Path, data: bytes) -> Manifest:
             "at the top, and the rest as docs/dataset.md says"
         )
     try:
-        manifest = msgspec.convert(tables, Manifest)
-    except msgspec.ValidationError as error:
-        raise _explain(path, text, str(error)) from None
+        manifest = read_toml(text.encode(), str(path), Manifest)
+    except ConfigError as error:
+        raise IdentificationError(str(error)) from None
     _check_trajectories(path, manifest)
     return manifest
 
@@ -156,42 +152,3 @@ def _check_trajectories(path: Path, manifest: Manifest) -> None:
             raise IdentificationError(
                 f'{path}: no trajectory has split = "{split}": at least one is needed {use}'
             )
-
-
-def _explain(path: Path, text: str, message: str) -> IdentificationError:
-    keys: list[str] = []
-    first = 0
-    if at := _AT.search(message):
-        message = message[: at.start()]
-        place = at["path"]
-        if entry := _ENTRY.match(place):
-            place = place[entry.end() :]
-            index = int(entry["index"])
-            text, first = _entry(text, index)
-            keys = ["trajectory"]
-        keys += [key for key in re.sub(r"\[.*", "", place).split(".") if key]
-    if unknown := _UNKNOWN.search(message):
-        keys = [*keys, unknown["field"]]
-        message = f"unknown key; {nearest(unknown['field'], _known(keys[:-1]))}"
-    line = line_of(text, keys) if keys else 0
-    where = f"{path}:{first + line}" if line else f"{path}"
-    name = f"{'.'.join(keys)}: " if keys else ""
-    return IdentificationError(f"{where}: {name}{message[:1].lower()}{message[1:]}")
-
-
-def _entry(text: str, index: int) -> tuple[str, int]:
-    """Return the text of one ``[[trajectory]]``, and how many lines are before it."""
-    lines = text.splitlines()
-    starts = [number for number, line in enumerate(lines) if _HEADER.match(line)]
-    if index >= len(starts):  # an array written in line
-        return "", 0
-    end = starts[index + 1] if index + 1 < len(starts) else len(lines)
-    return "\n".join(lines[starts[index] : end]), starts[index]
-
-
-def _known(keys: list[str]) -> list[str]:
-    tables: dict[tuple[str, ...], type[msgspec.Struct]] = {
-        (): Manifest, ("model",): ModelTable, ("trajectory",): TrajectoryTable,
-    }  # fmt: skip
-    found = tables.get(tuple(keys))
-    return [field.encode_name for field in msgspec.structs.fields(found)] if found else []

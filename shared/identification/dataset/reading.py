@@ -46,14 +46,14 @@ NANO: Final = 1e9
 Names = tuple[str, ...]
 
 
-def read_dataset(folder: Path) -> Dataset:
+def read_dataset(folder: Path | str) -> Dataset:
     """Return the data set in a folder; ``docs/dataset.md`` is the contract.
 
     Raises:
         IdentificationError: something is missing, damaged, or cannot be used; says which file,
             column and row, what was expected and what to do.
     """
-    files = Files()
+    folder, files = Path(folder), Files()
     manifest = read_manifest(folder / FILE, files.read(folder / FILE))
     source = _source(folder, manifest.model, files)
     trajectories: list[Trajectory] = []

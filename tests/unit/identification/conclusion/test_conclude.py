@@ -221,6 +221,7 @@ def test_a_share_of_much_may_be_left_unless_links_are_far_from_what_is_known(
 def test_links_far_from_what_is_known_of_them_make_the_base_too_coarse(searches: Searches):
     found = conclude(searches.search(_BAD, doubted=("mass elbow",)), ())
     assert (found.word, found.causes) == ("base_too_coarse", ())
+    assert "with mass elbow as the model file has it" in found.sentence
 
 
 def test_the_base_is_told_before_and_after_within_its_bounds(searches: Searches):
