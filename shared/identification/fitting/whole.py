@@ -15,12 +15,16 @@ from shared.identification.gate.held_out import plain_stretches
 from shared.identification.search.searched import ByAll, Search, is_open
 from shared.identification.verdict import Unexplained
 
+_LONG = (1e-7, 1e-3, 1.0)
+"""Factors of damping: the first lets go of all that hardly shows."""
+
 
 def fit_to_all(found: Search, left: Sequence[Unexplained]) -> None:
     """Fit a search's model to the held-out recordings, too.
 
     If a cause was accepted, for its size; if much is left, for how much of that remains. Held-out
-    recordings in which something pushed the arm, or in which blocks do not count, stay out of it.
+    recordings in which something pushed the arm, or in which blocks do not count, stay out of it:
+    if all do, sizes are of those that it was fitted to before.
 
     Args:
         found: the search, over.
@@ -35,19 +39,28 @@ def fit_to_all(found: Search, left: Sequence[Unexplained]) -> None:
         if segment not in problem.uncounted
         and names[problem.segments[segment].trajectory] not in pushed
     )
-    is_asked = is_open(found) and problem.noise.is_measured
-    if not more or not (found.accepted or is_asked):
+    is_asked = is_open(found) and problem.noise.is_measured and bool(more)
+    if not (found.accepted or is_asked):
         return
-    segments = (*problem.of("train"), *more)
-    begun = _with_more(current, more)
-    fit = go_down(begun, segments)
-    if not is_foretold(begun, fit):
-        fit = Fit.at(fit.space, fit.z, segments, is_rough=True)  # is for intervals only
+    train, fit = problem.of("train"), current
+    segments = (*train, *more)
+    if more:
+        fit = go_down(_with_more(current, more), segments)
     if found.accepted:
+        fit = _settled(fit, segments)
         found.final, found.fitted_to = fit, segments
     if is_asked:
-        both = [_left(fit, segments, of) for of in (problem.of("train"), more)]
+        both = [_left(fit, segments, of) for of in (train, more)]
         found.by_all = ByAll(max(one.new for one in both), max(one.plain for one in both))
+
+
+def _settled(fit: Fit, segments: tuple[int, ...]) -> Fit:
+    """Return a fit with sizes, and intervals, where only what is known of links has a say."""
+    fine = Fit.at(fit.space.fine(), fit.z, segments)
+    found = go_down(fine, segments, _LONG)
+    if is_foretold(fine, found):
+        return found
+    return Fit.at(found.space, found.z, segments, is_rough=True)  # is for intervals only
 
 
 def _with_more(fit: Fit, more: tuple[int, ...]) -> Fit:
