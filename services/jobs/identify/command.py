@@ -206,9 +206,11 @@ def _out_folder(dataset: Path, out: Path | None) -> Path:
 def opening(dataset: Dataset, out: Path) -> str:
     """Return what is going to be worked on, and what is better mended before that."""
     train, test = len(dataset.train), len(dataset.test)
+    repeats = len(dataset.trajectories) - train - test
+    again = f" ({repeats} repeated)" if repeats else ""
     seconds = sum(each.duration for each in dataset.trajectories)
     first = (
-        f"{len(dataset.joints)} joints, {train} recordings to fit and {test} held out, "
+        f"{len(dataset.joints)} joints, {train} recordings to fit and {test} held out{again}, "
         f"{seconds:.0f} s in all, {len(in_words(dataset.caveats))} caveats; writes to {out}"
     )
     mixed = in_words([each for each in dataset.caveats if each.name in MIXED_UP])

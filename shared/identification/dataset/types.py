@@ -107,13 +107,16 @@ class Dataset:
 
     @property
     def train(self) -> tuple[Trajectory, ...]:
-        """Return what may be fitted to."""
-        return tuple(each for each in self.trajectories if each.split == "train")
+        """Return what is fitted to; repeats only say what noise is."""
+        return self._of("train")
 
     @property
     def test(self) -> tuple[Trajectory, ...]:
         """Return what is held out."""
-        return tuple(each for each in self.trajectories if each.split == "test")
+        return self._of("test")
+
+    def _of(self, split: Split) -> tuple[Trajectory, ...]:
+        return tuple(each for each in self.trajectories if each.split == split and not each.repeats)
 
     @property
     def has_tracker(self) -> bool:

@@ -156,7 +156,7 @@ def predict(dataset: Dataset, noise: Noise, effects: Sequence[Effect]) -> Predic
         effects: the catalogue.
     """
     # A repeat only makes the noise known, and what is held out only judges.
-    kept = replace(dataset, trajectories=tuple(each for each in dataset.train if not each.repeats))
+    kept = replace(dataset, trajectories=dataset.train)
     subject = able_subject(kept)
     problem = Problem(subject, kept, base_parameters(subject), noise)
     space = Space(problem)

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from shared.identification.fitting.fit import Fit, go_down, is_foretold
+from shared.identification.fitting.together import with_all_together
 from shared.identification.gate.held_out import plain_stretches
 from shared.identification.search.searched import ByAll, Search, is_open
 from shared.identification.verdict import Unexplained
@@ -56,11 +57,13 @@ def fit_to_all(found: Search, left: Sequence[Unexplained]) -> None:
 
 def _settled(fit: Fit, segments: tuple[int, ...]) -> Fit:
     """Return a fit with sizes, and intervals, where only what is known of links has a say."""
-    fine = Fit.at(fit.space.fine(), fit.z, segments)
-    found = go_down(fine, segments, _LONG)
-    if is_foretold(fine, found):
-        return found
-    return Fit.at(found.space, found.z, segments, is_rough=True)  # is for intervals only
+    begun = _finely(fit, segments)
+    found = go_down(begun, segments, _LONG)
+    return found if is_foretold(begun, found) else _finely(found, segments)
+
+
+def _finely(fit: Fit, segments: tuple[int, ...]) -> Fit:
+    return with_all_together(Fit.at(fit.space.fine(), fit.z, segments), segments)
 
 
 def _with_more(fit: Fit, more: tuple[int, ...]) -> Fit:

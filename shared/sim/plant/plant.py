@@ -152,11 +152,15 @@ def mjcf(
             raise IdentificationError(
                 f"{path} has no joint {name!r}, which the log has; it has: {', '.join(known)}"
             )
-        if int(compiled.jnt_type[known[name]]) not in _JOINTS:
-            raise IdentificationError(f"{path}: joint {name!r} is no hinge or slide")
+    for name, index in known.items():
+        if int(compiled.jnt_type[index]) not in _JOINTS:
+            raise IdentificationError(
+                f"{path}: joint {name!r} is no hinge or slide: an arm stands still and has nothing "
+                "loose, so take it out of the MJCF"
+            )
     if missing := [name for name in known if name not in joints]:
         raise IdentificationError(
-            f"joints.parquet lacks {', '.join(missing)}, which {path} has: "
+            f"{path} has joints of which the log has no column (q_{', q_'.join(missing)}): "
             "log every joint, or take it out of the MJCF"
         )
     drives = _drives(compiled, control, joints, actuators, path)

@@ -4,13 +4,19 @@ from pathlib import Path
 
 from services.jobs.identify.command import opening
 from shared.identification.dataset.reading import read_dataset
-from tests.unit.identification.dataset.folders import command, motion, table, written
+from tests.unit.identification.dataset.folders import MANIFEST, command, motion, table, written
 
 
 def test_the_first_line_says_what_there_is(tmp_path: Path) -> None:
     said = opening(read_dataset(written(tmp_path)), Path("out"))
     assert said.startswith("2 joints, 2 recordings to fit and 1 held out, 12 s in all, ")
     assert said.endswith(" caveats; writes to out")
+
+
+def test_a_repeat_is_neither_fitted_to_nor_held_out(tmp_path: Path) -> None:
+    again = MANIFEST.replace('name = "two"', 'name = "two"\nrepeats = "one"')
+    said = opening(read_dataset(written(tmp_path, manifest=again)), Path("out"))
+    assert "1 recordings to fit and 1 held out (1 repeated), " in said
 
 
 def test_signs_that_do_not_match_are_told_before_anything_is_fitted(tmp_path: Path) -> None:

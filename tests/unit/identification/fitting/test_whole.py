@@ -81,7 +81,7 @@ def test_what_links_alone_say_is_not_told_more_surely_than_they_do(searches: Sea
         along = np.r_[more, fit.z[len(more) :]]
         return float(np.linalg.norm(fit.jacobian[: -fit.space.size] @ along))
 
-    assert shows(found.final) < 0.1 * shows(found.current)
+    assert shows(found.final) < 0.02 * shows(found.current)
 
 
 def test_what_is_known_of_the_fit_is_not_simulated_again(searches: Searches):
