@@ -253,9 +253,10 @@ def test_junk_from_a_stranger_is_refused_and_counted(zenoh_world: Any) -> None:
         assert values.take() is None
         assert inbox.take() is None
         assert bus.counters["refused_messages"] >= 58
-        answers = [reply for replies in asked for reply in replies]
-        assert len(answers) == len(asked)
-        assert all(reply.err is not None for reply in answers)
+        # Where the end of a query is lost on its way, Zenoh adds a timeout to the refusal.
+        answers = [list(replies) for replies in asked]
+        assert all(answers)
+        assert all(reply.err is not None for replies in answers for reply in replies)
 
 
 def test_raw_junk_on_the_port_does_not_stop_the_router(
