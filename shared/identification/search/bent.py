@@ -206,11 +206,15 @@ def ties_with_base(found: Search) -> tuple[Tie, ...]:
 def _known(problem: Problem) -> tuple[BaseParameter, ...]:
     """Return all of the base's parameters as what a model file that is about right says of them.
 
-    A friction of which it says nothing may be any; links are as well known as ever.
+    A friction of which it says nothing may be any; links are as well known as ever. What only these
+    recordings show (``shown.py``) stays.
     """
+    usual = base_parameters(problem.subject)
+    names = {each.name for each in usual}
+    shown = (each for each in problem.parameters if each.name not in names)
     return tuple(
         replace(each, prior=NEARBY * unit_of(each)) if is_of_file(each) else each
-        for each in base_parameters(problem.subject)
+        for each in (*usual, *shown)
     )
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from shared.identification.effect import Candidate
 from shared.identification.fitting.fit import Fit, polish
+from shared.identification.fitting.shown import if_shown
 from shared.identification.fitting.space import Space
 from shared.identification.search.bent import (
     _brings_back,  # pyright: ignore[reportPrivateUsage]
@@ -42,6 +43,12 @@ def bases(folder: Path, *, is_far: bool) -> tuple[Fit, Space]:
     z = found.z.copy()
     z[index] = z[index] if is_far else space.bounds[0][index]
     return Fit.at(space, z, train), Space(replace(problem, parameters=_known(problem)))
+
+
+def test_what_only_these_recordings_show_of_an_arm_is_not_forgotten(tmp_path: Path):
+    problem = problem_of(measure(tmp_path, np.random.default_rng(0), seconds=2.0))
+    more = if_shown(problem.subject)
+    assert _known(problem.freer(more))[len(problem.parameters) :] == more
 
 
 def test_a_base_that_only_went_far_where_nothing_holds_it_comes_back(tmp_path: Path):
