@@ -22,17 +22,16 @@ _MOST_OWN = 0.9
 def half_widths(fit: Fit, segments: tuple[int, ...]) -> Float64:
     """Return float64[n]: half of the 95 % interval of each coordinate.
 
-    Residuals say nothing of what they hardly depend on, as of a joint's damping beside a servo's:
-    of the base's numbers what is known beforehand says that they may still be off by so much.
+    Residuals say nothing of what they hardly depend on, as of a joint's damping beside a servo's,
+    or of a load beside links that may be heavier themselves: what is known of the base's numbers
+    beforehand says that these, and what goes with them, may still be off by so much.
 
     Args:
         fit: on the recordings ``segments``.
         segments: in the order in which the fit had them.
     """
     covariance, free = _covariance(fit, by_stretch(fit.space.problem, segments))
-    squares = np.maximum(np.diag(covariance), 0.0)
-    base = slice(0, fit.space.base_size)
-    squares[base] = np.maximum(squares[base], np.diag(fit.spread)[base])
+    squares = np.maximum(np.diag(covariance), np.diag(fit.spread))
     return float(stdtrit(free, 0.975)) * np.sqrt(squares)
 
 

@@ -71,6 +71,17 @@ def test_what_residuals_do_not_show_of_the_base_is_as_unsure_as_beforehand():
     assert hidden == pytest.approx(1.96 * prior, rel=0.1)
 
 
+def test_a_cause_that_hardly_differs_from_that_is_as_unsure():
+    """The second number is of the base, the third a cause that only together with it shows."""
+    rng = np.random.default_rng(4)
+    column, prior = rng.standard_normal((400, 1)), 0.1
+    jacobian = np.r_[np.c_[1e-3 * column, column, column], np.diag([1.0, 1.0 / prior, 0.0])]
+    space = Line((400, 1), base_size=2)
+    fit = Fit(cast(Any, space), np.zeros(3), rng.standard_normal(403), jacobian, 0.0)
+    cause = half_widths(fit, (0,))[2]
+    assert cause == pytest.approx(1.96 * np.hypot(prior, 400**-0.5), rel=0.15)
+
+
 @pytest.mark.parametrize(
     ("effect", "place", "is_enough"), [(STRIBECK, "elbow", False), (TILT, "", True)]
 )
