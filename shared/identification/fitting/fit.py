@@ -152,10 +152,7 @@ def go_down(
         costs = 0.5 * np.sum(found**2, axis=1)
         best = int(np.argmin(costs))
         moved = tries[best] - z
-        length = float(moved @ moved)
-        if length > 1e-12:
-            off = found[best] - residual - jacobian @ moved
-            jacobian = jacobian + np.outer(off, moved) / length
+        jacobian = mended(jacobian, moved, found[best] - residual)
         if costs[best] >= cost:
             damping *= 100.0
             continue
@@ -165,6 +162,20 @@ def go_down(
         if is_enough and promised(Fit(space, z, residual, jacobian, cost)) > cost * (1 - slight):
             break
     return Fit(space, z, residual, jacobian, cost)
+
+
+def mended(jacobian: Float64, moved: Float64, came: Float64) -> Float64:
+    """Return a derivative that says of one step what came of it (Broyden 1965).
+
+    Args:
+        jacobian: float64[M + n, n], as it was.
+        moved: float64[n], the step.
+        came: float64[M + n], by how much the residual changed.
+    """
+    length = float(moved @ moved)
+    if length <= 1e-12:
+        return jacobian
+    return jacobian + np.outer(came - jacobian @ moved, moved) / length
 
 
 def descend(

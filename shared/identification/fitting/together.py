@@ -13,7 +13,7 @@ import re
 import numpy as np
 
 from shared.identification.dataset.types import Float64
-from shared.identification.fitting.fit import Fit
+from shared.identification.fitting.fit import Fit, mended
 from shared.identification.fitting.space import Space
 
 _STEP = 0.02
@@ -22,7 +22,7 @@ _FORCE = re.compile(r"\b(N|kg)\b")
 
 
 def with_all_together(fit: Fit, segments: tuple[int, ...]) -> Fit:
-    """Return a fit whose derivative is right where all is larger together (Broyden 1965).
+    """Return a fit whose derivative is right where all is larger together.
 
     Args:
         fit: with a derivative by one number after another.
@@ -33,9 +33,7 @@ def with_all_together(fit: Fit, segments: tuple[int, ...]) -> Fit:
     moved = fit.space.clip(larger(fit.space, fit.z, _STEP))
     way = moved - fit.z
     came = fit.space.residual([moved], segments)[0] - fit.residual
-    off = came - fit.jacobian @ way
-    jacobian = fit.jacobian + np.outer(off, way) / max(float(way @ way), 1e-12)
-    return Fit.of(fit.space, fit.z, fit.residual, jacobian)
+    return Fit.of(fit.space, fit.z, fit.residual, mended(fit.jacobian, way, came))
 
 
 def larger(space: Space, z: Float64, share: float) -> Float64:

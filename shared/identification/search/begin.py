@@ -73,7 +73,8 @@ def begin(
     noise = noise_of(dataset, BLOCK, subject.starts, subject.nominal)
     released = known = base_parameters(subject)
     shown = if_shown(subject)
-    if fits is not None and not {each.name for each in (*known, *shown)} >= set(fits.names):
+    by_name = {each.name: each for each in (*known, *shown)}
+    if fits is not None and not by_name.keys() >= set(fits.names):
         fits = None
     candidates, ruled_out = candidates_of(catalogue, subject, without)
     pushed = {each.trajectory for each in aside}
@@ -87,7 +88,6 @@ def begin(
             noise = no_more(noise, Space(full, lacks))
         full = replace(full, noise=noise)
     if fits is not None:
-        by_name = {each.name: each for each in (*known, *shown)}
         known = tuple(by_name[name] for name in fits.names)
     problem = replace(full, parameters=known)
     progress("base fit", 0.0, f"{len(known)} parameters" + ("" if fits is None else ", kept"))
