@@ -340,5 +340,7 @@ def _record_next(conclusion: Conclusion, dataset: Dataset) -> tuple[str, ...]:
             "show without one."
         )
     if conclusion.word in ("unexplained", "base_too_coarse"):
-        out.append("Record the whole programme of `riposte identify excite`, joint by joint.")
+        out.append(
+            "Record the whole programme that riposte identify excite designs, joint by joint."
+        )
     return tuple(out)

@@ -33,6 +33,8 @@ HEAT = LinearSegmentedColormap.from_list(
     "heat", [(0.95, 0.62, 0.2, 0.12), (0.93, 0.45, 0.15, 0.75), (0.72, 0.05, 0.2, 1.0)]
 )
 """From next to nothing to dark red, on white and on near-black."""
+LETTER = 0.025
+"""Width of a mark over a lane, as a share of it."""
 LONGEST_NAME = 26
 MOST_POINTS = 900
 """Of a curve."""
@@ -220,11 +222,13 @@ def timeline(
                 edges, [row - 0.28, row + 0.28], np.log10(np.maximum(values, 0.3))[None],
                 cmap=HEAT, vmin=0.0, vmax=1.3, rasterized=False, linewidth=0,
             )  # fmt: skip
-        for row, begin, end, mark in spans:
+        for row, begin, end, _ in spans:
             axes.plot([begin, end], [row + 0.38] * 2, color=INK, linewidth=2.4,
                       solid_capstyle="butt")  # fmt: skip
-            axes.text((begin + end) / 2, row - 0.31, mark, color=INK, fontsize=9, ha="center",
-                      va="bottom", fontweight="bold")  # fmt: skip
+        longest = max((float(edges[-1]) for _, edges, _ in lanes), default=0.0)
+        for row, at, mark in _apart(spans, LETTER * longest):
+            axes.text(at, row - 0.31, mark, color=INK, fontsize=9, ha="center", va="bottom",
+                      fontweight="bold")  # fmt: skip
         _named_rows(axes, [name for name, _, _ in lanes])
         axes.set_ylim(len(lanes) - 0.45, -0.75)
         axes.set_xlabel("time (s)")
@@ -235,6 +239,19 @@ def timeline(
             bar.set_label(f"left by the extended model; 1 is {floor}")
             bar.outline.set_visible(False)
         return drawn(figure)
+
+
+def _apart(
+    spans: Sequence[tuple[int, float, float, str]], least: float
+) -> list[tuple[int, float, str]]:
+    """Return lane, place (s) and mark of each span: over its middle, or right of one that is."""
+    found: list[tuple[int, float, str]] = []
+    for lane, begin, end, mark in sorted(spans, key=lambda each: (each[0], each[1] + each[2])):
+        at = 0.5 * (begin + end)
+        if found and found[-1][0] == lane:
+            at = max(at, found[-1][1] + least)
+        found.append((lane, at, mark))
+    return found
 
 
 def _named_rows(axes: Axes, names: Sequence[str]) -> None:

@@ -23,6 +23,7 @@ from services.jobs.identify.words import verdict_text
 from shared.clock import SystemClock
 from shared.config.site import nearest
 from shared.errors import ConfigError
+from shared.identification.arm.subject import plant_of
 from shared.identification.catalogue import effects
 from shared.identification.dataset.caveats import MIXED_UP, in_words
 from shared.identification.dataset.reading import read_dataset
@@ -62,6 +63,7 @@ def main(argv: Sequence[str]) -> int:
     found = _parse(argv)
     _check_effects(found.without)
     dataset = _dataset(found.dataset, found.model)
+    plant_of(dataset)  # refuses models that do not fit, before there is a folder
     out = _out_folder(found.dataset, found.out)
     display = StepDisplay(SystemClock())
     with RunLock(out):
@@ -211,10 +213,12 @@ def opening(dataset: Dataset, out: Path) -> str:
     seconds = sum(each.duration for each in dataset.trajectories)
     first = (
         f"{len(dataset.joints)} joints, {train} recordings to fit and {test} held out{again}, "
-        f"{seconds:.0f} s in all, {len(in_words(dataset.caveats))} caveats; writes to {out}"
+        f"{seconds:.0f} s in all; writes to {out}"
     )
+    names = sorted({each.name for each in dataset.caveats})
+    limits = [f"caveats: {', '.join(names)}"] if names else []
     mixed = in_words([each for each in dataset.caveats if each.name in MIXED_UP])
-    return "\n".join([first, *(f"beware: {each}" for each in mixed)])
+    return "\n".join([first, *limits, *(f"beware: {each}" for each in mixed)])
 
 
 def _told(argv: Sequence[str]) -> list[str]:

@@ -180,7 +180,7 @@ def _held_out(verdict: Verdict, evidence: Evidence) -> Html:
     floor = _of(held_out.joints_mrad, "noise_floor")
     rows.append((
         "noise floor" if held_out.is_floor_measured else "noise floor, not measured",
-        words.number_text(held_out.noise_floor),
+        "1" if held_out.is_floor_measured else words.number_text(held_out.noise_floor),
         floor,
         *((_of(held_out.tracker_mm, "noise_floor"),) if held_out.tracker_mm else ()),
     ))  # fmt: skip
@@ -189,7 +189,8 @@ def _held_out(verdict: Verdict, evidence: Evidence) -> Html:
     share = words.share_text(held_out.share_removed, held_out.share_interval)
     caption = (
         "Root-mean-square residual on trajectories that nothing was fitted to. The extension "
-        f"removes {share} of what lies between base fit and {words.floor_name(held_out)} (95 %)."
+        f"removes {share} (95 %) of what lies between base fit and "
+        f"{words.number_text(held_out.noise_floor)}, which a right model leaves at most."
     )
     if not verdict.causes:
         caption = "Root-mean-square residual on trajectories that nothing was fitted to."

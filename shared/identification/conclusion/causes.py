@@ -96,7 +96,5 @@ def motion(tried: Tried, rivals: tuple[Tried, ...], names: list[str]) -> str:
     elif sides == {"command"}:
         how = "a chirp and fast swings, with readings that come faster than commands"
     else:
-        how = (
-            "the static grid, the crawl with reversals and fast swings of `riposte identify excite`"
-        )
+        how = "the static grid, the crawl and the swings that riposte identify excite designs"
     return f"To tell {' from '.join(names)}: {how}."

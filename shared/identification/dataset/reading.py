@@ -32,6 +32,7 @@ from shared.identification.dataset.tables import Table
 from shared.identification.dataset.types import (
     POSE,
     Caveat,
+    Control,
     Dataset,
     Float64,
     ModelSource,
@@ -74,6 +75,10 @@ def read_dataset(folder: Path | str) -> Dataset:
         found += limits
     _check_copies(folder, trajectories)
     found += caveats.of_set(trajectories, joints, manifest.control)
+    wrong = caveats.no_repeats(trajectories, manifest.control)
+    trajectories = [
+        replace(each, repeats="") if each.name in wrong else each for each in trajectories
+    ]
     return Dataset(
         folder, source, manifest.control, joints, actuators, tuple(trajectories), tuple(found),
         files.hash,
@@ -136,8 +141,7 @@ def _trajectory(
     else:
         checks.check_finite(command, actuators)
         sent = np.stack([command.columns[each] for each in actuators], axis=1)
-        if manifest.control == "position":
-            found += _check_commands(name, recording, joints, q)
+        found += _check_commands(name, recording, joints, q, manifest.control)
     speed = surely_moving(times, q) if qd is None else logged_velocities(times, q, qd)
     made = Trajectory(
         name, entry.split, entry.repeats,
@@ -160,12 +164,17 @@ def _trajectory(
     return made, found
 
 
-def _check_commands(name: str, recording: Recording, joints: Names, q: Float64) -> list[Caveat]:
+def _check_commands(
+    name: str, recording: Recording, joints: Names, q: Float64, control: Control
+) -> list[Caveat]:
     """Check that joints go where they are sent, as far as commands are named like them."""
     command, readings = recording.command, recording.readings
     rows = np.maximum(np.searchsorted(command.t_ns, readings.t_ns, side="right") - 1, 0)
-    sent = {each: command.columns[each][rows] for each in joints if each in command.columns}
     got = {each: q[:, index] for index, each in enumerate(joints)}
+    if control == "torque":
+        torques = {each: column[rows] for each, column in command.columns.items()}
+        return caveats.of_torques(name, torques, got)
+    sent = {each: command.columns[each][rows] for each in joints if each in command.columns}
     for joint, positions in sent.items():
         checks.check_unit(command.path, joint, positions, got[joint])
     return caveats.of_commands(name, sent, got)

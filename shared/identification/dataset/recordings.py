@@ -185,8 +185,10 @@ def _joint_columns(table: Table, model: ModelTable) -> tuple[Columns, list[str]]
     for kind in ("qd", "effort"):
         for joint in found[kind]:
             if joint not in found["q"]:
+                alone = [each for each in found["q"] if each not in found[kind]]
+                advice = f"it has q of {', '.join(found['q'])}: log it, or leave the column out"
                 raise IdentificationError(
                     f"{table.path} has column '{kind}_{joint}' but no 'q_{joint}'; "
-                    f"{nearest(joint, found['q'])}"
+                    + (nearest(joint, alone) if alone else advice)
                 )
     return found, unused

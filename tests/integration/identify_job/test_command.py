@@ -43,6 +43,18 @@ def test_a_folder_that_is_no_data_set_gets_one_line(
     assert not (tmp_path / "identify-nothing").exists()
 
 
+def test_a_model_that_does_not_fit_leaves_no_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = dataset_at(tmp_path)
+    other = tmp_path / "other.xml"
+    other.write_text(
+        "<mujoco><worldbody><body><joint name='waist'/><geom size='1'/></body></worldbody></mujoco>"
+    )
+    assert "has no joint 'shoulder'" in complaint(capsys, folder, "--model", other)
+    assert not (tmp_path / "identify-friday").exists()
+
+
 def test_bad_options_get_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = dataset_at(tmp_path)
     assert "--seed is -1" in complaint(capsys, folder, "--seed", -1)

@@ -1,5 +1,6 @@
 """Figures of identification: what they are given they can draw."""
 
+import re
 import warnings
 
 import numpy as np
@@ -59,3 +60,22 @@ def test_a_timeline_marks_what_was_located() -> None:
     drawing = timeline([("run 1", edges, values)], [(0, 1.0, 2.0, "A")])
     assert ">A<" in drawing
     assert ">run 1<" in drawing
+
+
+def test_marks_of_a_timeline_stand_apart() -> None:
+    edges, values = np.linspace(0.0, 4.0, 9), np.ones(8)
+    spans = [(0, 1.0, 1.02, "A"), (0, 1.01, 1.03, "B"), (0, 3.0, 3.2, "C")]
+    drawing = timeline([("run 1", edges, values)], spans)
+    at = {mark: _place_of(drawing, mark) for mark in "ABC"}
+    assert at["B"] - at["A"] > 6.0  # points
+    assert at["C"] - at["B"] > 100.0
+
+
+def _place_of(drawing: str, text: str) -> float:
+    found = re.search(rf'<text [^>]* x="([0-9.]+)"[^>]*>{text}<', drawing)
+    assert found is not None
+    return float(found[1])
+
+
+def test_nothing_is_late_by_less_than_nothing() -> None:
+    assert ">0.0<" in lags({"elbow": -0.01, "wrist": 12.0})

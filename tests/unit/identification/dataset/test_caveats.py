@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from shared.identification.dataset.caveats import in_words
+from shared.identification.dataset.caveats import MIXED_UP, in_words
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.dataset.types import Caveat
 from tests.unit.identification.dataset.folders import (
@@ -137,8 +137,19 @@ def test_one_motion_for_all_and_a_test_that_is_train_are_told(tmp_path):
 
 def test_a_repeat_of_another_motion_is_told(tmp_path):
     text = MANIFEST.replace('name = "two"\n', 'name = "two"\nrepeats = "one"\n')
-    found = the(written(tmp_path, manifest=text), "repeat_differs")
+    folder = written(tmp_path, manifest=text)
+    found = the(folder, "repeat_differs")
     assert found.trajectory == "two"
+    assert "a recording of its own" in found.text
+    assert the(folder, "no_repeat").trajectory == ""
+    assert [each.name for each in read_dataset(folder).train] == ["one", "two"]
+
+
+def test_torques_that_a_controller_sends_twice_are_a_repeat_though_they_differ(tmp_path):
+    text = MANIFEST.replace('name = "two"\n', 'name = "two"\nrepeats = "one"\n')
+    folder = written(tmp_path, manifest=text.replace("position", "torque"))
+    assert "more noise than there is" in the(folder, "repeat_differs").text
+    assert [each.name for each in read_dataset(folder).train] == ["one"]
 
 
 def test_a_repeat_of_the_same_commands_is_fine(tmp_path):
@@ -235,6 +246,43 @@ def test_joints_that_follow_one_another_s_commands_are_told(tmp_path):
     assert "see whether their columns are mixed up" in found[0].text
 
 
+def test_a_joint_that_is_told_to_rest_may_sag_along_with_another(tmp_path):
+    folder = written(tmp_path)
+    joints = motion(1)
+    sent = command(joints) | {"elbow": np.zeros(400)}
+    joints["q_elbow"], joints["qd_elbow"] = (
+        0.1 * joints[f"{kind}_shoulder"] for kind in ("q", "qd")
+    )
+    rewritten(folder, 1, joints, sent)
+    assert not {each.name for each in read_dataset(folder).caveats} & set(MIXED_UP)
+
+
+def test_positions_that_are_called_torques_are_told(tmp_path):
+    folder = written(tmp_path, manifest=MANIFEST.replace("position", "torque"))
+    found = [each for each in read_dataset(folder).caveats if each.name == "like_positions"]
+    assert [each.trajectory for each in found] == ["one", "two", "three"]
+    assert "the torques of shoulder, elbow go with the joints, and as far" in found[0].text
+
+
+def test_torques_are_not_taken_for_positions(tmp_path):
+    folder = written(tmp_path, manifest=MANIFEST.replace("position", "torque"))
+    for seed in range(3):
+        joints = motion(seed)
+        times = (joints["t_ns"] - joints["t_ns"][0]) / 1e9
+        sent = {"shoulder": 2.0 * np.cos(2.1 * times), "elbow": 3.0 * joints["q_elbow"]}
+        rewritten(folder, seed, joints, command(joints) | sent)
+    assert not {each.name for each in read_dataset(folder).caveats} & set(MIXED_UP)
+
+
+def test_torques_that_are_called_positions_are_told(tmp_path):
+    folder = written(tmp_path)
+    joints = motion(1)
+    times = (joints["t_ns"] - joints["t_ns"][0]) / 1e9
+    sent = {name: np.sin((9.0 + index) * times) for index, name in enumerate(JOINTS)}
+    rewritten(folder, 1, joints, command(joints) | sent)
+    assert 'write control = "torque"' in the(folder, "follows_none").text
+
+
 def test_joints_that_move_alike_or_lag_are_told_nothing_of(tmp_path):
     folder = written(tmp_path)
     joints = motion(1)
@@ -243,4 +291,4 @@ def test_joints_that_move_alike_or_lag_are_told_nothing_of(tmp_path):
     late = {name: np.r_[np.full(20, sent[name][0]), sent[name][:-20]] for name in JOINTS}
     rewritten(folder, 1, joints, sent | late)
     names = {each.name for each in read_dataset(folder).caveats}
-    assert not names & {"other_way", "other_joint"}
+    assert not names & set(MIXED_UP)

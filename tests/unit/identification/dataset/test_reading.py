@@ -190,6 +190,13 @@ def drop(name):
     return lambda columns: columns.pop(name)
 
 
+def rename(old, new):
+    def change(columns):
+        columns[new] = columns.pop(old)
+
+    return change
+
+
 def times(of):
     def change(columns):
         columns["t_ns"] = of(columns["t_ns"])
@@ -201,7 +208,8 @@ def times(of):
     ("file", "change", "words"),
     [
         ("joints", drop("t_ns"), "no column 't_ns'"),
-        ("joints", drop("q_elbow"), "'qd_elbow' but no 'q_elbow'"),
+        ("joints", drop("q_elbow"), "'qd_elbow' but no 'q_elbow'; it has q of shoulder: log it"),
+        ("joints", rename("q_elbow", "q_Elbow"), "no 'q_elbow'; did you mean 'Elbow'?"),
         ("command", drop("elbow"), "differ in 'elbow' of their command tables"),
         ("tracker", drop("qy"), "no column 'qy'"),
         ("joints", put("q_elbow", 17, np.nan), "column 'q_elbow', row 17 is nan"),
