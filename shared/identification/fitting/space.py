@@ -1,6 +1,6 @@
 """A vector for the optimiser: the base's coordinates, then the sizes of effects in probes."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,12 +8,15 @@ from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate, Quantity
 from shared.identification.fitting.problem import Problem, Variant
 
-_STEP = 0.02
-"""Of a difference quotient along a base coordinate: 2 %."""
-_EXTRA_STEP = 0.1
+_STEP = 1e-3
+"""Of a difference quotient along a base coordinate.
+
+Of an arm under servos whose efforts nobody logs all masses, gains, frictions and loads may be
+larger together, and only what is known of links says by how much. A quotient over 2 % bends that
+so much that recordings seem to show it: sizes are biased, and intervals a tenth of what they
+should be."""
+_EXTRA_STEP = 0.01
 """Along the size of an effect, in probes."""
-_FINE = 0.05
-"""Of both, see :meth:`Space.fine`."""
 _OF_TURN = 0.05
 """Along an interval that comes again and again: of itself, what its last turn moves by."""
 
@@ -24,8 +27,6 @@ class Space:
 
     problem: Problem
     candidates: tuple[Candidate, ...] = ()
-    is_fine: bool = False
-    """Whether difference quotients are over short steps."""
 
     @property
     def base_size(self) -> int:
@@ -64,18 +65,7 @@ class Space:
     @property
     def steps(self) -> Float64:
         """Return float64[n], of difference quotients."""
-        found = np.array([_STEP] * self.base_size + [_EXTRA_STEP] * len(self.quantities))
-        return _FINE * found if self.is_fine else found
-
-    def fine(self) -> "Space":
-        """Return the same with derivatives for sizes and intervals.
-
-        Of an arm under servos whose efforts nobody logs all masses, gains, frictions and loads may
-        be larger together, and only what is known of links says by how much. A quotient over 2 %
-        bends that so much that recordings seem to show it, and intervals are a tenth of what they
-        should be. Fits come further down by what a longer step says.
-        """
-        return replace(self, is_fine=True)
+        return np.array([_STEP] * self.base_size + [_EXTRA_STEP] * len(self.quantities))
 
     def smooth(self) -> "Space":
         """Return the same with smooth commands, see :meth:`Problem.smooth`."""

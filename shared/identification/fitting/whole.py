@@ -57,13 +57,13 @@ def fit_to_all(found: Search, left: Sequence[Unexplained]) -> None:
 
 def _settled(fit: Fit, segments: tuple[int, ...]) -> Fit:
     """Return a fit with sizes, and intervals, where only what is known of links has a say."""
-    begun = _finely(fit, segments)
+    begun = _anew(fit, segments)
     found = go_down(begun, segments, _LONG)
-    return found if is_foretold(begun, found) else _finely(found, segments)
+    return found if is_foretold(begun, found) else _anew(found, segments)
 
 
-def _finely(fit: Fit, segments: tuple[int, ...]) -> Fit:
-    return with_all_together(Fit.at(fit.space.fine(), fit.z, segments), segments)
+def _anew(fit: Fit, segments: tuple[int, ...]) -> Fit:
+    return with_all_together(Fit.at(fit.space, fit.z, segments), segments)
 
 
 def _with_more(fit: Fit, more: tuple[int, ...]) -> Fit:

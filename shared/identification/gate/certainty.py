@@ -10,7 +10,7 @@ from shared.identification.gate.clusters import Integers, by_channel, by_stretch
 
 CALIBRATED = 1.35
 """Times the half width of a cause's size, since no simulation is quite the arm: without it 57 of 67
-intervals covered on development data, with it 62 (docs/identify.md)."""
+intervals covered on development data, with it 62 (docs/identify_results.md)."""
 SURE = float(ndtri(0.975))
 """Standard errors by which a cause is surely off nothing (95 %)."""
 _NOTHING = 0.01

@@ -10,6 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from shared.identification.dataset.types import Float64
+from shared.identification.fitting.linear import least_squares
 from shared.identification.gate.held_out import stretches
 from shared.identification.search.judging import held_of
 from shared.identification.search.screen import Screened
@@ -34,10 +36,12 @@ def hopeless(found: Search) -> Callable[[Screened], bool]:
     """
     if not found.problem.noise.is_white or not found.parts.is_near_noise:
         return lambda one: False
-    return lambda one: _is_hopeless(found, one)
+    # Where the base alone wants to go is far, along what hardly shows: no candidate is to blame.
+    base = least_squares(found.parts.jacobian, -found.parts.residual)
+    return lambda one: _is_hopeless(found, one, base)
 
 
-def _is_hopeless(found: Search, one: Screened) -> bool:
+def _is_hopeless(found: Search, one: Screened, base: Float64) -> bool:
     problem, current = found.problem, found.current
     quantities = one.candidate.effect.quantities(problem.subject, one.candidate.place)
     if one.candidate.recording is not None or one.share > _SMALL:
@@ -45,7 +49,7 @@ def _is_hopeless(found: Search, one: Screened) -> bool:
     if any(each.phase or not each.is_smooth for each in quantities):
         return False  # where it acts only from some size on, what is small there is not elsewhere
     space = current.space.grown(one.candidate)
-    expected = space.clip(np.r_[current.z + one.shift, one.start])
+    expected = space.clip(np.r_[current.z + one.shift - base, one.start])
     losses = stretches(problem, space.variant(expected), problem.of("test"))
     before = float(found.current_losses.mean())
     if before - float(losses.mean()) > _GAINS * before:

@@ -68,7 +68,7 @@ def test_where_nothing_is_hidden_nothing_is_named(wish: str, seed: int) -> None:
 @pytest.mark.parametrize("without", [(), ("backlash",)])
 def test_what_is_not_in_the_catalogue_is_not_called_what_is_most_like_it(without: tuple[str, ...]):
     """Play of a gear whose load hardly turns round is nearly another zero of the encoder."""
-    wishes = (wish_of("backlash@elbow=0.03"),)
+    wishes = (wish_of("backlash@elbow=0.025"),)
     recipe = Recipe(arm="arm3", seconds=6.0, train=2, test=2, seed=9015, wishes=wishes)
     verdict = identify(simulated(recipe)[0], without=without).verdict
     causes = [(cause.effect, cause.where) for cause in verdict.causes]

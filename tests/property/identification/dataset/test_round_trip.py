@@ -33,16 +33,19 @@ def dataset(
 ) -> Dataset:  # fmt: skip
     rng = np.random.default_rng(seed)
     actuators = POSE if control == "pose" else tuple(motors)
-    made = []
+    made: list[Trajectory] = []
     for index, split in enumerate(order):
         rows, sent = int(rng.integers(60, 120)), int(rng.integers(1, 120))
         command = posed(rng, sent) if control == "pose" else rng.normal(size=(sent, len(actuators)))
+        sent_at = risen(rng, sent)
+        if made:  # a repeat has the commands of what it repeats
+            command, sent_at = made[0].command, made[0].command_at
         qd, effort = (rng.normal(size=(rows, len(joints))) for _ in range(2))
         at = risen(rng, 90, int(rng.integers(-(10**8), 10**8)))
         made.append(Trajectory(
             f"t{index}", split, "t0" if index else "",
             rng.normal(size=len(joints)), rng.normal(size=len(joints)),
-            risen(rng, sent), command, risen(rng, rows, int(rng.integers(0, 10**9))),
+            sent_at, command, risen(rng, rows, int(rng.integers(0, 10**9))),
             0.5 * rng.normal(size=(rows, len(joints))),
             qd if logged[0] else None, effort * 1e3 if logged[1] else None,
             at if logged[2 + index] else None, posed(rng, 90) if logged[2 + index] else None,

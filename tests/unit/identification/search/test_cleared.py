@@ -18,8 +18,8 @@ _BASE, _LEFT = np.full(4, 200.0), np.full(4, 15.0)
 
 def _heavier(row: Row) -> None:
     body = row.body_of("elbow")
-    row.field("body_mass")[body] *= 2.0
-    row.field("body_inertia").reshape(-1, 3)[body] *= 2.0
+    row.field("body_mass")[body] *= 4.0
+    row.field("body_inertia").reshape(-1, 3)[body] *= 4.0
 
 
 def _doubted(folder: Path, enter: Enter) -> Search:

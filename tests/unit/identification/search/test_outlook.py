@@ -61,7 +61,7 @@ def test_where_nothing_is_hidden_hardly_anything_has_a_prospect():
 
 def test_what_links_could_make_up_for_there_is_refitted_if_it_may_be_much():
     nothing = begun("")
-    torque = seen(nothing)[Candidate(BIAS, "shoulder")]
+    torque = seen(nothing)[Candidate(BIAS, "elbow")]
     is_hopeless = hopeless(nothing)
     assert is_hopeless(torque)
     assert not is_hopeless(replace(torque, share=0.019))
