@@ -4,10 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from shared.identification.dataset.types import Float64
 from shared.identification.fitting.fit import Fit, polish
 from shared.identification.fitting.parameters import INERTIA_PRIOR, BaseParameter
 from shared.identification.fitting.space import Space
 from shared.identification.gate.certainty import half_widths
+from shared.identification.gate.held_out import stretches
 from shared.identification.search.searched import Far, Search
 from shared.telemetry.wording import listing
 
@@ -51,25 +53,38 @@ def surely_far(fit: Fit) -> list[int]:
 
 
 def shown_far(found: Search) -> list[int]:
-    """Return the same of a search's model, without what can be put back at hardly any cost.
+    """Return the same of a search's model, without what can be put back.
 
-    A derivative says that others could not make up for a number where a valley bends. Of many, all
-    are put back at once.
+    A derivative says that others could not make up for a number where a valley bends: it is put
+    back at hardly any cost. Or held-out motion is none the worse for it, and a number is far only
+    to make up for something in what was fitted to. Of many, all are put back at once.
     """
     fit = found.current
     if found.far is None or found.far.fit is not fit:
         far = surely_far(fit)
         alone = [[one] for one in far] if len(far) <= FEW else [far]
-        found.far = Far(fit, [one for some in alone if _are_shown(fit, some) for one in some])
+        losses = found.current_losses
+        found.far = Far(
+            fit, [one for some in alone if _are_shown(fit, losses, some) for one in some]
+        )
     return found.far.numbers
 
 
-def _are_shown(fit: Fit, numbers: Sequence[int]) -> bool:
-    """Return whether a fit with some numbers as the model file has them is surely worse."""
+def _are_shown(fit: Fit, losses: Float64, numbers: Sequence[int]) -> bool:
+    """Return whether a model is worse with some numbers as its file has them.
+
+    Args:
+        fit: of the model.
+        losses: float64[S], what it leaves of held-out motion.
+        numbers: coordinates of the base.
+    """
     problem = fit.space.problem.without(numbers)
     space, least = Space(problem, fit.space.candidates), fit.cost + _SHOWN
     start = np.delete(fit.z, numbers)
-    return polish(space, start, problem.of("train"), _STEPS, wanted=least).cost > least
+    back = polish(space, start, problem.of("train"), _STEPS, wanted=least)
+    if back.cost <= least:
+        return False
+    return float(stretches(problem, back.variant, problem.of("test")).mean()) > float(losses.mean())
 
 
 def far_from_file(found: Search) -> str:

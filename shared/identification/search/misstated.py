@@ -10,8 +10,9 @@ from collections.abc import Sequence
 
 from shared.identification.effect import Candidate, Effect
 from shared.identification.progress import Progress
-from shared.identification.search.begin import begin_without
+from shared.identification.search.begin import begin_without, doubted_of
 from shared.identification.search.bent import is_worse
+from shared.identification.search.cleared import clear
 from shared.identification.search.far import FEW, shown_far
 from shared.identification.search.rounds import search
 from shared.identification.search.searched import Search, is_open
@@ -43,11 +44,17 @@ def misstated(
     names = [each.name for each in untouched.problem.parameters]
     progress("screen", 0.0, f"again, with {listing(list(wrong))} as the model file has it")
     other = begin_without(untouched, [names.index(name) for name in wrong], seed=seed)
-    other.doubted = untouched.doubted
+    bent = [other.problem.parameters[index].name for index in doubted_of(other.base)]
+    if bent:
+        # Of an arm whose masses, gains and other frictions are all as much smaller it is right.
+        gone = [names.index(name) for name in (*wrong, *bent)]
+        other = begin_without(untouched, gone, seed=seed)
+    other.doubted = (*untouched.doubted, *bent)
     other.candidates = (*other.candidates, *wrong.values())
-    gone = {each.effect.name for each in wrong.values()}
-    other.ruled_out = {name: why for name, why in other.ruled_out.items() if name not in gone}
+    known = {each.effect.name for each in wrong.values()}
+    other.ruled_out = {name: why for name, why in other.ruled_out.items() if name not in known}
     search(other, progress)
+    clear(other, progress)
     named = {each.candidate for each in other.accepted}
     if not named.issuperset(wrong.values()) or is_open(other):
         return None

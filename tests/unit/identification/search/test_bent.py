@@ -10,6 +10,7 @@ from shared.identification.effect import Candidate
 from shared.identification.fitting.fit import Fit, polish
 from shared.identification.fitting.shown import if_shown
 from shared.identification.fitting.space import Space
+from shared.identification.gate.held_out import stretches
 from shared.identification.search.bent import (
     _brings_back,  # pyright: ignore[reportPrivateUsage]
     _known,  # pyright: ignore[reportPrivateUsage]
@@ -71,7 +72,9 @@ def test_a_number_that_can_be_put_back_at_no_cost_is_not_shown(tmp_path: Path, i
     base, _ = bases(tmp_path, is_far=is_far)
     index = [each.name for each in base.space.problem.parameters].index(NAME)
     assert index in far_of(base)
-    assert _are_shown(base, [index]) is is_far
+    losses = stretches(base.space.problem, base.variant, base.space.problem.of("test"))
+    assert _are_shown(base, losses, [index]) is is_far
+    assert not _are_shown(base, 1e6 * losses, [index])  # held-out motion would rather have it back
 
 
 @pytest.mark.parametrize(
