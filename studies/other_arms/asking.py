@@ -6,8 +6,14 @@ from pathlib import Path
 from shared.identification.conclusion.sentence import as_told
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.find import identify
-from studies.other_arms.arms import ARMS
+from studies.other_arms.arms import ARMS, Arm
+from studies.other_arms.drawn import DRAWN, drawn
 from studies.other_arms.recording import convert
+
+
+def arm_named(name: str, seed: int) -> Arm:
+    """Return one of the three arms, or one that is drawn."""
+    return drawn(DRAWN[name], seed) if name in DRAWN else ARMS[name]
 
 
 def asked(job: tuple[str, str, int, float]) -> str:
@@ -15,7 +21,7 @@ def asked(job: tuple[str, str, int, float]) -> str:
     name, wrong, seed, seconds = job
     with tempfile.TemporaryDirectory() as folder:
         data = Path(folder) / "data"
-        fault = convert(data, ARMS[name], wrong, seconds, seed)
+        fault = convert(data, arm_named(name, seed), wrong, seconds, seed)
         verdict = identify(read_dataset(data), seed=seed).verdict
     causes = map(as_told, verdict.causes)
     said = [f"{each.effect} {each.where} {each.value:.4g} {each.unit}" for each in causes]

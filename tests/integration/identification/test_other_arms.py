@@ -8,6 +8,8 @@ import pytest
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.dataset.types import Dataset
 from studies.other_arms.arms import ARMS
+from studies.other_arms.asking import arm_named
+from studies.other_arms.drawn import DRAWN
 from studies.other_arms.faults import ABSORBED, FAULTS
 from studies.other_arms.recording import convert
 
@@ -41,6 +43,20 @@ def test_an_arm_is_recorded_with_a_repeat_and_held_out_motion(right: dict[str, D
     moved = np.ptp(slow.q, axis=0)
     assert np.all(off < 0.02 * moved)
     assert np.all(off > 0.0)
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_an_arm_that_is_drawn_goes_where_it_is_sent(tmp_path: Path, name: str):
+    arm = arm_named(name, 4)
+    assert arm_named(name, 5).joints != arm.joints or arm_named(name, 5).limit[0] != arm.limit[0]
+    convert(tmp_path / "set", arm, "none", SECONDS, 4, STEP)
+    dataset = read_dataset(tmp_path / "set")
+    assert dataset.control == DRAWN[name]
+    for each in dataset.trajectories:
+        assert np.abs(each.q - arm.home).max() < 4.0 * arm.swing.max()
+    slow = dataset.trajectories[0]
+    if name == "hanging":
+        assert np.abs(slow.q - slow.command).max() < 0.3
 
 
 @pytest.mark.parametrize(
