@@ -209,10 +209,18 @@ def _searched(
 def _may_be_its_step(found: Search) -> bool:
     """Return whether a time step that is too long could be what a verdict tells of otherwise.
 
-    It leaves a little more than a verdict may leave, or something looks like a small push.
+    It leaves a little more than a verdict may leave, or something looks like a small push, or like
+    a delay that is hardly longer than what a simulation is late by itself.
     """
     is_little = is_open(found) and max(found.left.least, found.plainly.least) < _LITTLE
-    return is_little or any(one.is_event for one in found.accepted)
+    if is_little or any(one.is_event for one in found.accepted):
+        return True
+    space, subject = found.current.space, found.problem.subject
+    sizes = zip(space.candidates, space.values(found.current.z), strict=True)
+    return any(
+        0.0 < abs(float(values[0])) < 2.0 * each.effect.quantities(subject, each.place)[0].least
+        for each, values in sizes
+    )
 
 
 def _pushed_once(found: Search, left: tuple[Unexplained, ...]) -> tuple[Unexplained, ...]:
@@ -303,7 +311,8 @@ def _shorter_step(found: Search, dataset: Dataset) -> str:
     own = plant_of(dataset).timestep
     return (
         f"all of this was simulated at a time step of {1e3 * step:g} ms: at the model file's "
-        f"{1e3 * own:g} ms more than noise was left, or what looked like a push. model.xml has it"
+        f"{1e3 * own:g} ms more than noise was left, or what looked like a push or a delay of less "
+        "than that. model.xml has it"
     )
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.dataset.types import Dataset
+from shared.identification.find import identify
 from studies.other_arms.arms import ARMS
 from studies.other_arms.asking import arm_named
 from studies.other_arms.drawn import DRAWN
@@ -57,6 +58,14 @@ def test_an_arm_that_is_drawn_goes_where_it_is_sent(tmp_path: Path, name: str):
     slow = dataset.trajectories[0]
     if name == "hanging":
         assert np.abs(slow.q - slow.command).max() < 0.3
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_what_a_long_time_step_is_late_by_is_no_delay(tmp_path: Path):
+    convert(tmp_path / "set", arm_named("hanging", 1), "none", 8.0, 1)
+    verdict = identify(read_dataset(tmp_path / "set"), seed=1).verdict
+    assert (verdict.verdict, verdict.timestep) == ("none", 0.0005), verdict.sentence
 
 
 @pytest.mark.parametrize(
