@@ -139,7 +139,7 @@ def lags(values: Mapping[str, float]) -> str:
         axes.set_xlim(1.25 * low - 0.05 * reach, 1.25 * max(0.05 * reach, float(numbers.max())))
         for row, value in zip(rows, numbers.tolist(), strict=True):
             axes.annotate(
-                f"{round(value, 1) + 0.0:.1f}".replace("-", "\N{MINUS SIGN}"), (value, row),
+                f"{value:z.1f}".replace("-", "\N{MINUS SIGN}"), (value, row),
                 xytext=(5 if value >= 0 else -5, 0), textcoords="offset points", va="center",
                 ha="left" if value >= 0 else "right", color=INK, fontsize=9,
             )  # fmt: skip

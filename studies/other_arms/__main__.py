@@ -12,8 +12,8 @@ from pathlib import Path
 
 from shared.runtime.process import THREAD_LIMITS
 from studies.other_arms.arms import ARMS
-from studies.other_arms.asking import arm_named, asked
-from studies.other_arms.drawn import DRAWN
+from studies.other_arms.asking import asked
+from studies.other_arms.drawn import DRAWN, arm_named
 from studies.other_arms.faults import ABSORBED, FAULTS
 from studies.other_arms.recording import convert
 

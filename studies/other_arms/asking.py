@@ -6,14 +6,8 @@ from pathlib import Path
 from shared.identification.conclusion.sentence import as_told
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.find import identify
-from studies.other_arms.arms import ARMS, Arm
-from studies.other_arms.drawn import DRAWN, drawn
+from studies.other_arms.drawn import arm_named
 from studies.other_arms.recording import convert
-
-
-def arm_named(name: str, seed: int) -> Arm:
-    """Return one of the three arms, or one that is drawn."""
-    return drawn(DRAWN[name], seed) if name in DRAWN else ARMS[name]
 
 
 def asked(job: tuple[str, str, int, float]) -> str:

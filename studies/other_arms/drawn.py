@@ -6,7 +6,7 @@ import numpy as np
 
 from shared.identification.dataset.types import Float64
 from shared.sim.plant.plant import Control
-from studies.other_arms.arms import Arm, Link, Numbers
+from studies.other_arms.arms import ARMS, Arm, Link, Numbers
 
 DRAWN: Final[dict[str, Control]] = {"hanging": "position", "hanging_torques": "torque"}
 """What commands are, by name."""
@@ -14,12 +14,18 @@ _COUNTS: Final = (2, 2, 2, 3, 3, 3, 4, 4, 6)
 _GRAVITY: Final = 9.81
 
 
+def arm_named(name: str, seed: int) -> Arm:
+    """Return one of the three arms, or one that is drawn."""
+    return drawn(DRAWN[name], seed) if name in DRAWN else ARMS[name]
+
+
 def drawn(control: Control, seed: int) -> Arm:
     """Return an arm of two to six hinges.
 
-    Half of them turn about the vertical first, those of six roll their hand last. Rotors are a
-    fifth to four fifths of what they move; servos would swing at 3 to 5 Hz, half as damped as they
-    may be without overshoot; friction is a fiftieth to a seventeenth of the largest weight.
+    Half of those of three or more turn about the vertical first, those of six roll their hand last.
+    Rotors are a fifth to four fifths of what they move; servos would swing at 3 to 5 Hz, half as
+    damped as they may be without overshoot; friction is a fiftieth to a seventeenth of the largest
+    weight.
 
     Args:
         control: what commands are.

@@ -25,7 +25,8 @@ from shared.config.site import nearest
 from shared.errors import ConfigError
 from shared.identification.arm.subject import plant_of
 from shared.identification.catalogue import effects
-from shared.identification.dataset.caveats import MIXED_UP, in_words
+from shared.identification.dataset.caveats import in_words
+from shared.identification.dataset.followed import MIXED_UP
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.dataset.types import Dataset
 from shared.identification.find import identify

@@ -1,7 +1,7 @@
 """What limits a usable recording: named, with the value and what to do."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -26,18 +26,6 @@ COARSE: Final = 1e-3
 SLOWEST_HZ: Final = 40.0
 FASTER: Final = 1.5
 """Times the fastest motion that is fitted to: what is held out says nothing of the fit then."""
-ALIKE: Final = 0.05
-"""Share of a command's own movement by which two commands differ that are nearly the same."""
-_MOVES: Final = 0.01
-"""Standard deviation of what moves at all (rad, m)."""
-_FOLLOWS: Final = 0.95
-"""Correlation of where a joint is with where it is sent, if it surely goes there."""
-_FOLLOWS_NOT: Final = 0.5
-"""The same, if it surely does not."""
-_AS_FAR: Final = 0.7
-"""Of the way of a command, that a joint goes at least which follows it; and the other way round."""
-MIXED_UP: Final = ("other_way", "other_joint", "follows_none", "like_positions")
-"""Caveats of data that is hardly what was recorded."""
 JUMP_SPEED: Final = 10.0
 """Of a tracker (m/s)."""
 JUMP: Final = 0.03
@@ -178,85 +166,6 @@ def of_joints(trajectory: Trajectory, joints: Sequence[str]) -> list[Caveat]:
     return found
 
 
-def of_commands(name: str, sent: Mapping[str, Float64], got: Mapping[str, Float64]) -> list[Caveat]:
-    """Return what is strange of where joints go, beside where they are sent.
-
-    Args:
-        name: of the recording.
-        sent: float64[T] of each joint, the position in force at each reading.
-        got: float64[T] of each joint, what was read.
-    """
-    found: list[Caveat] = []
-    for joint, own in sent.items():
-        like = _likeness(own, got[joint])
-        if like < -_FOLLOWS:
-            found.append(Caveat("other_way", name, (
-                f"joint {joint!r} goes the other way than its command (correlation "
-                f"{like:.2f}): turn the sign of one of them round, or of the joint's axis in the "
-                "model file, unless its actuator has a negative gear"
-            )))  # fmt: skip
-            continue
-        if like >= _FOLLOWS_NOT:
-            continue
-        others = {each: _likeness(sent[each], got[joint]) for each in sent if each != joint}
-        other = max(others, key=lambda each: others[each], default=joint)
-        if others.get(other, 0.0) > _FOLLOWS and _goes_as_far(sent[other], got[joint]):
-            found.append(Caveat("other_joint", name, (
-                f"joint {joint!r} follows the command of {other!r} (correlation "
-                f"{others[other]:.2f}) and not its own ({like:.2f}): see whether their columns are "
-                "mixed up"
-            )))  # fmt: skip
-    likes = [abs(_likeness(own, got[joint])) for joint, own in sent.items() if _moves(got[joint])]
-    if likes and max(likes) < _FOLLOWS_NOT and not found:
-        found.append(Caveat("follows_none", name, (
-            "no joint goes where its command says (the largest correlation is "
-            f'{max(likes):.2f}): write control = "torque" if these are torques, and see whether '
-            "commands and readings are of one recording and one clock"
-        )))  # fmt: skip
-    return found
-
-
-def of_torques(name: str, sent: Mapping[str, Float64], got: Mapping[str, Float64]) -> list[Caveat]:
-    """Return ``like_positions`` where torques are where joints go, as no torques are.
-
-    Args:
-        name: of the recording.
-        sent: float64[T] of each actuator, the torque in force at each reading.
-        got: float64[T] of each joint, what was read.
-    """
-    moving = {each: torque for each, torque in sent.items() if _moves(torque)}
-    for torque in moving.values():
-        if not any(
-            _likeness(torque, each) > _FOLLOWS and _goes_as_far(torque, each)
-            for each in got.values()
-        ):
-            return []
-    if not moving:
-        return []
-    return [Caveat("like_positions", name, (
-        f"the torques of {', '.join(moving)} go with the joints, and as far: write "
-        'control = "position" if these are positions that servos hold'
-    ))]  # fmt: skip
-
-
-def _moves(series: Float64) -> bool:
-    return float(series.std()) >= _MOVES
-
-
-def _goes_as_far(command: Float64, reading: Float64) -> bool:
-    """Return whether a joint goes about as far as a command says."""
-    sizes = float(command.std()), float(reading.std())
-    return min(sizes) > _AS_FAR * max(sizes)
-
-
-def _likeness(one: Float64, other: Float64) -> float:
-    """Return the correlation of two series; 0 where one hardly moves."""
-    if not (_moves(one) and _moves(other)):
-        return 0.0
-    first, second = one - one.mean(), other - other.mean()
-    return float(first @ second / (np.linalg.norm(first) * np.linalg.norm(second)))
-
-
 def of_tracker(trajectory: Trajectory) -> list[Caveat]:
     """Return ``tracker_jump`` where the tracker goes faster than an arm can."""
     if trajectory.tracker is None or trajectory.tracker_at is None or len(trajectory.tracker) < 3:
@@ -277,8 +186,7 @@ def of_set(
 ) -> list[Caveat]:
     """Return the caveats on all recordings together."""
     found: list[Caveat] = []
-    wrong = no_repeats(trajectories, control)
-    if not any(each.repeats and each.name not in wrong for each in trajectories):
+    if not any(each.repeats for each in trajectories):
         found.append(Caveat("no_repeat", "", (
             "no trajectory repeats another, so noise is estimated from the residual alone; play "
             'one programme twice and write repeats = "<name>"'
@@ -300,24 +208,7 @@ def of_set(
             found.append(Caveat(name, missing[0].name, (
                 f"not every trajectory {words}; not {names}" + (", ..." if len(missing) > 6 else "")
             )))  # fmt: skip
-    return found + _excitation(trajectories, joints) + _programs(trajectories, control)
-
-
-def no_repeats(trajectories: Sequence[Trajectory], control: Control) -> tuple[str, ...]:
-    """Return the names of what should repeat another recording and has other commands.
-
-    None under torque control: a controller's torques are never quite the same.
-    """
-    return () if control == "torque" else _differing(trajectories)
-
-
-def _differing(trajectories: Sequence[Trajectory]) -> tuple[str, ...]:
-    by_name = {each.name: each for each in trajectories}
-    return tuple(
-        each.name
-        for each in trajectories
-        if each.repeats and difference(by_name[each.repeats], each) > ALIKE
-    )
+    return found + _excitation(trajectories, joints)
 
 
 def _excitation(trajectories: Sequence[Trajectory], joints: Sequence[str]) -> list[Caveat]:
@@ -351,56 +242,3 @@ def _speed(trajectory: Trajectory, index: int) -> float:
     marks = np.arange(0, len(times), stride)
     speeds = np.abs(np.diff(trajectory.q[marks, index]) / np.diff(times[marks]))
     return float(np.quantile(speeds, 0.99)) if len(speeds) else 0.0
-
-
-def _programs(trajectories: Sequence[Trajectory], control: Control) -> list[Caveat]:
-    """Return ``one_program``, ``test_is_train`` and ``repeat_differs``."""
-    found: list[Caveat] = []
-    by_name = {each.name: each for each in trajectories}
-    train = [each for each in trajectories if each.split == "train"]
-    first = train[0]
-    if all(difference(first, each) < ALIKE for each in train[1:]):
-        found.append(Caveat("one_program", "", (
-            "all train recordings are of one motion: what it does not show is not found; record "
-            "different motions"
-        )))  # fmt: skip
-    differing = _differing(trajectories)
-    for each in trajectories:
-        if each.name in differing:
-            found.append(Caveat("repeat_differs", each.name, (
-                f"it should repeat {each.repeats!r}, but its commands differ by "
-                f"{difference(by_name[each.repeats], each):.0%} of their movement: "
-                + ("it may tell of more noise than there is" if control == "torque" else
-                   "it tells nothing of the noise, and is taken for a recording of its own")
-            )))  # fmt: skip
-        twins = [one.name for one in train if difference(one, each) < ALIKE]
-        if each.split == "test" and twins:
-            found.append(Caveat("test_is_train", each.name, (
-                f"its commands are those of the train recording {twins[0]!r}: it says little "
-                "about other motions; hold out another motion"
-            )))  # fmt: skip
-    return found
-
-
-def difference(one: Trajectory, other: Trajectory) -> float:
-    """Return how far two commands differ, as a share of their own movement.
-
-    Both are read at the same 500 times since their first command, over the shorter of the two;
-    1 or more where their lengths differ by more than a tenth.
-    """
-    spans = [each.command_at[-1] - each.command_at[0] for each in (one, other)]
-    if max(spans) > 1.1 * min(spans) + 0.1:
-        return 1.0
-    shorter = float(min(spans))
-    grid = 1e-9 + shorter * np.arange(500) / 499.0
-    first, second = [_held(each, each.command_at[0] + grid) for each in (one, other)]
-    centre: Float64 = np.mean(first, axis=0)
-    movement = float(np.sqrt(np.mean((first - centre) ** 2)))
-    apart = float(np.sqrt(np.mean((first - second) ** 2)))
-    return apart / movement if movement > 1e-12 else float(apart > 1e-12)
-
-
-def _held(trajectory: Trajectory, at: Float64) -> Float64:
-    """Return the commands in force at some times, none before the first."""
-    rows = np.searchsorted(trajectory.command_at, at, side="right") - 1
-    return np.take(trajectory.command, rows, axis=0)

@@ -8,7 +8,7 @@ import numpy as np
 
 from shared.config.site import nearest
 from shared.errors import IdentificationError
-from shared.identification.dataset import caveats, checks
+from shared.identification.dataset import caveats, checks, followed
 from shared.identification.dataset.beginnings import (
     first_positions,
     logged_velocities,
@@ -21,6 +21,7 @@ from shared.identification.dataset.manifest import (
     TrajectoryTable,
     read_manifest,
 )
+from shared.identification.dataset.programmes import of_programmes, repeats_of
 from shared.identification.dataset.recordings import (
     PR2_JOINTS,
     Files,
@@ -74,11 +75,9 @@ def read_dataset(folder: Path | str) -> Dataset:
         trajectories.append(made)
         found += limits
     _check_copies(folder, trajectories)
+    trajectories, differing = repeats_of(trajectories, manifest.control)
     found += caveats.of_set(trajectories, joints, manifest.control)
-    wrong = caveats.no_repeats(trajectories, manifest.control)
-    trajectories = [
-        replace(each, repeats="") if each.name in wrong else each for each in trajectories
-    ]
+    found += of_programmes(trajectories) + differing
     return Dataset(
         folder, source, manifest.control, joints, actuators, tuple(trajectories), tuple(found),
         files.hash,
@@ -173,11 +172,11 @@ def _check_commands(
     got = {each: q[:, index] for index, each in enumerate(joints)}
     if control == "torque":
         torques = {each: column[rows] for each, column in command.columns.items()}
-        return caveats.of_torques(name, torques, got)
+        return followed.of_torques(name, torques, got)
     sent = {each: command.columns[each][rows] for each in joints if each in command.columns}
     for joint, positions in sent.items():
         checks.check_unit(command.path, joint, positions, got[joint])
-    return caveats.of_commands(name, sent, got)
+    return followed.of_commands(name, sent, got)
 
 
 def _positions(

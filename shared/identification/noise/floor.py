@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from shared.identification.arm.parts import CUTS, Cut, spans_of
 from shared.identification.arm.smoothing import smooth
 from shared.identification.arm.starts import Starts
-from shared.identification.dataset.caveats import difference
+from shared.identification.dataset.programmes import difference
 from shared.identification.dataset.resolution import steps_of
 from shared.identification.dataset.types import Dataset, Float64, Trajectory
 from shared.identification.noise.drift import Drift, drift_of

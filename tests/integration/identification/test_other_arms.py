@@ -9,8 +9,7 @@ from shared.identification.dataset.reading import read_dataset
 from shared.identification.dataset.types import Dataset
 from shared.identification.find import identify
 from studies.other_arms.arms import ARMS
-from studies.other_arms.asking import arm_named
-from studies.other_arms.drawn import DRAWN
+from studies.other_arms.drawn import DRAWN, arm_named
 from studies.other_arms.faults import ABSORBED, FAULTS
 from studies.other_arms.recording import convert
 

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from shared.identification.dataset.caveats import MIXED_UP, in_words
+from shared.identification.dataset.caveats import in_words
+from shared.identification.dataset.followed import MIXED_UP
 from shared.identification.dataset.reading import read_dataset
 from shared.identification.dataset.types import Caveat
 from tests.unit.identification.dataset.folders import (
