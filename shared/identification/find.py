@@ -42,6 +42,9 @@ from shared.telemetry.wording import listing
 _LITTLE = 4.0
 """Mean square residual, in noise floors, up to which a time step may be all that is wrong."""
 
+_STEP_SHOWS = 0.5
+"""Root mean square of a joint, in noise floors, by which a time step shows where no start does."""
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -97,7 +100,14 @@ def identify(
     def folder_of(name: str) -> Path | None:
         return None if resume_folder is None else resume_folder / name
 
-    found, left = _searched(begun(dataset, resume_folder), run)
+    begins = begun(dataset, resume_folder)
+    if (
+        begins.problem.noise.has_free_starts
+        and (step := shorter(begins.base, _STEP_SHOWS)) is not None
+    ):
+        progress("base fit", 0.0, f"again, at a time step of {1e3 * step:g} ms")
+        begins = begun(with_timestep(dataset, step), folder_of("shorter_step"))
+    found, left = _searched(begins, run)
     if is_open(found) and (aside := pushed_in(found, left)):
         names = listing(sorted({each.trajectory for each in aside}))
         progress("base fit", 0.0, f"again, without what was pushed in {names}")

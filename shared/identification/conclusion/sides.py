@@ -7,7 +7,8 @@ import numpy as np
 
 from shared.identification.conclusion.evidence import Replay, Sides
 from shared.identification.dataset.types import Float64
-from shared.identification.noise.floor import Noise, block_means
+from shared.identification.noise.blocks import block_means
+from shared.identification.noise.floor import Noise
 from shared.sim.plant.signals import pose_error
 
 CLEAR = 1.5

@@ -65,6 +65,10 @@ def _usual_power(parts: list[Float64], control: Control) -> Float64:
     return np.median([part[:shortest] ** 2 for part in parts], axis=0).mean(axis=0)
 
 
+_STARTS = 2
+"""Times that a base is fitted again, with first states as the fit before answers them."""
+
+
 @dataclass(frozen=True)
 class SavedFits:
     """What it takes to have a base fit again."""
@@ -80,6 +84,8 @@ class SavedFits:
 
 def fit_again(space: Space, saved: SavedFits) -> BaseFits:
     """Return a base fit that was found before."""
+    if space.problem.noise.has_free_starts:
+        space = _starting_as(space, np.array(saved.whole))
     problem = space.problem
     parts = _on_parts(space)
     origin, pieces = np.zeros(space.size), parts.problem.of("train")
@@ -111,6 +117,22 @@ def fit_base(space: Space, rng: np.random.Generator) -> BaseFits:
     origin = np.zeros(space.size)
     searched = minimize(losses, origin, *space.bounds, sigma=0.3, seed=seed)
     return _fitted(space, searched)
+
+
+def with_starts(done: BaseFits) -> BaseFits:
+    """Return a base's fit whose first states are as free as the fit itself answers them."""
+    for _ in range(_STARTS):
+        space = _starting_as(done.whole.space, done.whole.z)
+        segments, origin = space.problem.of("train"), np.zeros(space.size)
+        whole = polish(space, done.whole.z, segments, 3)
+        whole = replace(whole, starts_agree=done.whole.starts_agree)
+        nominal = Start(origin, space.jacobian(origin, segments, is_rough=True)[1])
+        done = BaseFits(nominal, whole, whole)
+    return done
+
+
+def _starting_as(space: Space, z: Float64) -> Space:
+    return Space(space.problem.starting_as(space.variant(z)), space.candidates)
 
 
 def fit_without(space: Space, done: BaseFits, doubted: Sequence[int]) -> BaseFits:

@@ -12,6 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.identification.arm.segments import Segment, segments_of
+from shared.identification.arm.start_errors import (
+    FreeStarts,
+    StartErrors,
+    across,
+    as_it_is,
+    directions,
+)
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Dataset, Float64
 from shared.identification.effect import Candidate
@@ -75,6 +82,8 @@ class Problem:
     """bool[B] by segment: blocks that no loss counts, since something outside acted there."""
     aside: tuple[Span, ...] = ()
     """What nothing is fitted to, since something outside acted there."""
+    free_starts: FreeStarts | None = None
+    """What parts are off by where they begin; of the nominal arm, unless another one is given."""
     segments: tuple[Segment, ...] = field(init=False)
     _arms: dict[tuple[Structure, float], Rollouts] = field(
         default_factory=dict[tuple[Structure, float], Rollouts]
@@ -82,12 +91,17 @@ class Problem:
     """Compiled, by what effects have added and by time step."""
     _bins: dict[int, tuple["_Bins", "_Bins | None"]] = field(init=False)
     _whitening: dict[int, Float64 | None] = field(init=False)
+    _starts: dict[int, Float64] = field(init=False)
+    """float64[B C, K] by segment, along which first states may be off; where they are free."""
 
     def __post_init__(self) -> None:
         self.segments = segments_of(self.dataset, self.subject, self.window)
         self._arms.setdefault(((), self.subject.plant.timestep), self.subject.nominal)
         self._bins = {}
         self._whitening = {}
+        self._starts = {}
+        if self.noise.has_free_starts and self.free_starts is None:
+            self.free_starts = FreeStarts(self.subject.nominal, as_it_is)
         for index, segment in enumerate(self.segments):
             recorded = segment.recorded
             tracker = None if recorded.tracker_at is None else _Bins.of(recorded.tracker_at)
@@ -105,8 +119,13 @@ class Problem:
         """Return the same with recordings in parts that each start from the measured state."""
         return Problem(
             self.subject, self.dataset, self.parameters, self.noise, window,
-            aside=self.aside, _arms=self._arms,
+            aside=self.aside, free_starts=self.free_starts, _arms=self._arms,
         )  # fmt: skip
+
+    def starting_as(self, variant: Variant) -> "Problem":
+        """Return the same with first states as free as a variant answers them."""
+        arms = self._compiled(self.structure(variant), None)
+        return replace(self, free_starts=FreeStarts(arms, self.entry(variant)))
 
     def without(self, gone: Sequence[int]) -> "Problem":
         """Return the same with some parameters as the model file has them, by their places."""
@@ -128,7 +147,7 @@ class Problem:
         """Return the same with more numbers in the base, after those that it has."""
         return Problem(
             self.subject, self.dataset, (*self.parameters, *more), self.noise, self.window,
-            self.uncounted, self.aside, _arms=self._arms,
+            self.uncounted, self.aside, self.free_starts, _arms=self._arms,
         )  # fmt: skip
 
     def of(self, split: str) -> tuple[int, ...]:
@@ -170,6 +189,7 @@ class Problem:
             segments: which they replay.
             timestep: of the physics (s); the arm's own if None.
         """
+        self._free_starts(segments)
         groups: dict[Structure, list[int]] = defaultdict(list)
         for index, variant in enumerate(variants):
             groups[self.structure(variant)].append(index)
@@ -341,7 +361,27 @@ class Problem:
             more = of_tracker.mean(tracker) / self.noise.tracker
             rows = min(len(out), len(more))
             out = np.concatenate([out[:rows], more[:rows]], axis=1)
-        return np.nan_to_num(out, nan=DIVERGED, posinf=DIVERGED, neginf=-DIVERGED)
+        out = np.nan_to_num(out, nan=DIVERGED, posinf=DIVERGED, neginf=-DIVERGED)
+        return across(out, self._starts[segment]) if segment in self._starts else out
+
+    def _free_starts(self, segments: Sequence[int]) -> None:
+        """See to it that it is known of segments what they are off by where they begin."""
+        if not self.noise.has_free_starts or self.free_starts is None:
+            return
+        new = [each for each in segments if each not in self._starts]
+        errors = self.free_starts.of([self.segments[each].recorded for each in new])
+        for segment, error in zip(new, errors, strict=True):
+            self._starts[segment] = directions(self._in_floors_of(error, segment))
+
+    def _in_floors_of(self, error: StartErrors, segment: int) -> Float64:
+        """Return float64[B C, K], columns of start errors as :meth:`floors` has residuals."""
+        of_joints, of_tracker = self._bins[segment]
+        out = of_joints.mean(error.joints) / self.noise.joints[:, None]
+        if error.tracker is not None and of_tracker is not None and self.noise.tracker is not None:
+            more = of_tracker.mean(error.tracker) / self.noise.tracker[:, None]
+            rows = min(len(out), len(more))
+            out = np.concatenate([out[:rows], more[:rows]], axis=1)
+        return out.reshape(-1, out.shape[-1])
 
     def entry(self, variant: Variant) -> Entry:
         """Return what lets a variant into an arm."""
@@ -373,5 +413,6 @@ class _Bins:
         return _Bins(starts, np.diff(np.r_[starts, len(at)]).astype(np.float64)[:, None])
 
     def mean(self, values: Float64) -> Float64:
-        """Return float64[B, D]."""
-        return np.add.reduceat(values, self.starts, axis=0) / self.counts
+        """Return float64[B, ...] of float64[T, ...]."""
+        counts = self.counts.reshape(-1, *(1,) * (values.ndim - 1))
+        return np.add.reduceat(values, self.starts, axis=0) / counts

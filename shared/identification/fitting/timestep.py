@@ -41,7 +41,7 @@ def changed_by(fit: Fit, timestep: float) -> Float64:
     subject = replace(problem.subject, plant=plant, nominal=nominal)
     other = Problem(
         subject, problem.dataset, problem.parameters, problem.noise, problem.window,
-        aside=problem.aside,
+        aside=problem.aside, free_starts=problem.free_starts,
     )  # fmt: skip
     joints = len(subject.joints)
     before, after = (each.plain(variant, test) for each in (problem, other))
@@ -49,16 +49,17 @@ def changed_by(fit: Fit, timestep: float) -> Float64:
     return np.sqrt(np.mean(np.concatenate(changed) ** 2, axis=0))
 
 
-def shorter(fit: Fit) -> float | None:
+def shorter(fit: Fit, much: float = _MUCH) -> float | None:
     """Return the time step (s) by which to look again for what little is left; None if it is fine.
 
     A quarter: what is left over for want of it is a sixteenth of the mean square then.
 
     Args:
         fit: of a model without causes.
+        much: root mean square of a joint, in noise floors, from which it is too long.
     """
     subject = fit.space.problem.subject
-    is_coarse = subject.control != "pose" and float(step_error(fit).max()) > _MUCH
+    is_coarse = subject.control != "pose" and float(step_error(fit).max()) > much
     return 0.25 * subject.plant.timestep if is_coarse else None
 
 

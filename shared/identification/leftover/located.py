@@ -116,7 +116,9 @@ def _widths(problem: Problem) -> tuple[Width, Width | None]:
     """Return how wide the noise of joints and tracker is, by what repeats differ."""
     noise, count = problem.noise, len(problem.noise.joints)
     subject = problem.subject
-    pairs = repeat_differences(problem.dataset, BLOCK, subject.starts)
+    pairs = (
+        [] if noise.has_free_starts else repeat_differences(problem.dataset, BLOCK, subject.starts)
+    )
     of_joints = width_of(
         [
             noise.floors(each.joints * np.sqrt(0.5), noise.whitening(subject.nominal, each.q))

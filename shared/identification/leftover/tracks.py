@@ -13,7 +13,7 @@ from shared.identification.arm.smoothing import smooth
 from shared.identification.dataset.types import Float64, Trajectory
 from shared.identification.fitting.parameters import enter_base
 from shared.identification.fitting.problem import BLOCK, DIVERGED, Problem, Variant
-from shared.identification.noise.floor import block_means
+from shared.identification.noise.blocks import block_means
 from shared.sim.plant.inverse import inverse_dynamics
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.missing import missing_torque
@@ -137,9 +137,12 @@ def _joints(problem: Problem, segment: int, reports: Reports) -> tuple[Float64, 
     """Return instants and joint residuals of a segment's blocks."""
     recorded = problem.segments[segment].recorded
     at = recorded.joints_at - recorded.joints_at[0]
+    middles = block_means(at, recorded.joints_at[:, None], BLOCK)[:, 0]
+    if problem.noise.has_free_starts:
+        x = problem.floors(reports, segment)[:, : len(problem.noise.joints)]
+        return recorded.begin + middles[: len(x)], x
     off = block_means(at, problem.segments[segment].q - reports.q, BLOCK)
     x = problem.in_floors(off, segment)
-    middles = block_means(at, recorded.joints_at[:, None], BLOCK)[:, 0]
     if recorded.begin > 0.0:
         spread = _spread(at, middles, CUTS.get(problem.subject.control, CUT))
         if not problem.noise.is_measured:  # then the floor is what parts leave, spread and all

@@ -7,7 +7,7 @@ the blocks before it foretell, weighs all of them by how much they know (general
 Aitken 1936; of a state that a white force moves, a Kalman filter's innovations).
 
 Only where repeats measure it: the same commands twice do not answer what pushes the arm. Those of a
-controller that is not in the model do, within one block, and look late for that.
+controller that is not in the model do, within one block, and look late for that (``answered.py``).
 """
 
 # pyright: basic

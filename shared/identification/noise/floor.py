@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from shared.identification.arm.parts import CUTS, Cut, spans_of
 from shared.identification.arm.smoothing import smooth
 from shared.identification.arm.starts import Starts
-from shared.identification.dataset.programmes import difference
 from shared.identification.dataset.resolution import steps_of
 from shared.identification.dataset.types import Dataset, Float64, Trajectory
+from shared.identification.noise.answered import answered_noise, answers
+from shared.identification.noise.blocks import block_means
 from shared.identification.noise.drift import Drift, drift_of
 from shared.identification.noise.memory import Memory, memory_of, wandering
 from shared.identification.noise.pushed import Pushed, pushed_of, whitening
@@ -34,8 +35,6 @@ _FEWEST = 10
 """Readings that two recordings have to share, else the last of the shorter one is held."""
 _OF_PAIR = np.sqrt(0.5)
 """Of what two recordings differ by, that is the noise of one."""
-_SAME = 1e-3
-"""Share of their movement by which commands differ that are the same but for rounding."""
 _AXES = (slice(0, 3), slice(3, 6))
 """Of a tracker's error: how far off it is along each, and about each."""
 _ROUND = np.sqrt(12.0)
@@ -64,6 +63,9 @@ class Noise:
     is_torque: bool = False
     """Whether it is torques that the model lacks, not readings: a residual counts by what torque
     it takes, so by how hard the arm is to move."""
+    has_free_starts: bool = False
+    """Whether residuals are without what a part's first state may be off by, see
+    :mod:`shared.identification.arm.start_errors`."""
 
     @property
     def is_white(self) -> bool:
@@ -175,22 +177,12 @@ def noise_of(
         correlation = np.r_[correlation, found.correlation[len(whitened) :]]
         found = replace(unit, whitened=whitened, correlation=correlation)
         hidden = np.zeros(len(whitened))
-    return _remembered(found, pairs, nominal, hidden, dataset)
-
-
-def _answers(dataset: Dataset) -> bool:
-    """Return whether commands answer what happens: given twice, they are not quite the same."""
-    by_name = {each.name: each for each in dataset.trajectories}
-    return any(
-        difference(by_name[each.repeats], each) > _SAME
-        for each in dataset.trajectories
-        if each.repeats
-    )
+    return _remembered(found, pairs, nominal, hidden, dataset, block)
 
 
 def _remembered(
     noise: Noise, pairs: Sequence[Difference], nominal: Rollouts | None, rounding: Float64,
-    dataset: Dataset,
+    dataset: Dataset, block: float,
 ) -> Noise:  # fmt: skip
     """Return the noise with how much of it is carried on, or how it grows.
 
@@ -200,6 +192,7 @@ def _remembered(
         nominal: the arm; None for one that is held by its joints.
         rounding: float64[J], what an encoder's steps hide, in noise floors.
         dataset: the recordings.
+        block: what residuals are averaged over (s).
     """
     joints: list[Float64] = []
     tracker: list[Float64] = []
@@ -211,18 +204,36 @@ def _remembered(
         tracker += _split(each.tracker / noise.tracker, each.tracker_parts)
     no_steps = np.zeros(0 if noise.tracker is None else len(noise.tracker))
     if nominal is not None and nominal.plant.control == "torque":
+        if answers(dataset) and (found := _answered(noise, nominal, dataset, rounding, block)):
+            return found
         drift = drift_of(joints, _OF_PAIR, rounding)
         seen = drift_of(tracker, _OF_PAIR, no_steps) if tracker else None
         if drift is not None and (noise.tracker is None or seen is not None):
             blocks = max(len(each) for each in joints)
-            grown = noise.growing(drift if seen is None else drift.beside(seen), blocks)
-            # Where commands answer the noise, what is new goes with them.
-            return replace(grown, memory=None) if _answers(dataset) else grown
+            return noise.growing(drift if seen is None else drift.beside(seen), blocks)
     found = memory_of(joints, _OF_PAIR, rounding)
     if noise.tracker is not None:
         seen = memory_of(tracker, _OF_PAIR, no_steps)
         found = found.beside(wandering(seen, tracker, _OF_PAIR, _AXES))
     return replace(noise, memory=found)
+
+
+def _answered(
+    noise: Noise, nominal: Rollouts, dataset: Dataset, rounding: Float64, block: float
+) -> Noise | None:
+    """Return the noise beyond first states; None of recordings too short for parts."""
+    cut = CUTS[nominal.plant.control]
+    found = answered_noise(dataset, nominal, cut, block)
+    if found is None:
+        return None
+    count = len(noise.joints)
+    return replace(
+        noise,
+        joints=np.maximum(found.levels[:count], rounding * noise.joints),
+        tracker=None if noise.tracker is None else found.levels[count:],
+        correlation=found.correlation,
+        has_free_starts=True,
+    )
 
 
 def _split(values: Float64, parts: Integers) -> list[Float64]:
@@ -300,17 +311,3 @@ def _fast(at: Float64, values: Float64) -> Float64:
     """Return what a local quadratic leaves: faster than the arm moves."""
     width = min(_BAND, (len(at) - 1) // 2 * 2 - 1)
     return values - smooth(values, max(width, 5))
-
-
-def block_means(at: Float64, values: Float64, block: float) -> Float64:
-    """Return float64[B, D]: means over blocks that follow each other from the first instant.
-
-    Args:
-        at: float64[T] (s), rising.
-        values: float64[T', D] of the first T' instants.
-        block: length (s); one without a reading is left out.
-    """
-    number = np.floor((at[: len(values)] - at[0]) / block + 1e-6).astype(np.int64)
-    starts = np.flatnonzero(np.r_[True, np.diff(number) > 0])
-    counts = np.diff(np.r_[starts, len(values)])[:, None]
-    return np.add.reduceat(values, starts, axis=0) / counts

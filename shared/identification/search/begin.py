@@ -15,6 +15,7 @@ from shared.identification.fitting.base import (
     fit_base,
     fit_without,
     floor_from_base,
+    with_starts,
 )
 from shared.identification.fitting.fit import Fit
 from shared.identification.fitting.parameters import BaseParameter, base_parameters, bends
@@ -130,6 +131,8 @@ class _Step:
         done = (
             with_shown(fit_base(space, rng), self.shown) if fits is None else fit_again(space, fits)
         )
+        if fits is None and problem.noise.has_free_starts:
+            done = with_starts(done)
         problem = done.whole.space.problem
         if lacking(done.whole.space, self.candidates):
             self.progress(

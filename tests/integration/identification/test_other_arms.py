@@ -67,6 +67,15 @@ def test_what_a_long_time_step_is_late_by_is_no_delay(tmp_path: Path):
     assert (verdict.verdict, verdict.timestep) == ("none", 0.0005), verdict.sentence
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_an_arm_under_torques_goes_by_what_it_does_not_by_how_parts_begin(tmp_path: Path):
+    convert(tmp_path / "set", arm_named("hanging_torques", 1), "none", 8.0, 1)
+    verdict = identify(read_dataset(tmp_path / "set"), seed=1).verdict
+    assert (verdict.verdict, verdict.timestep) == ("none", 0.0005), verdict.sentence
+    assert verdict.held_out.joints_mrad["noise_floor"] < 0.1
+
+
 @pytest.mark.parametrize(
     ("arm", "fault"),
     [("scara", name) for name in FAULTS if name not in ("none", "weak")] + [("three", "weak")],

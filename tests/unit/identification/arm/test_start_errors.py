@@ -1,0 +1,85 @@
+"""What a part is off by because its first state is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shared.identification.arm.start_errors import FreeStarts, across, as_it_is, directions
+from shared.identification.arm.subject import subject_of
+from shared.identification.fitting.parameters import base_parameters
+from shared.identification.fitting.problem import BLOCK, Problem, Variant
+from shared.identification.hidden.generator import simulated
+from shared.identification.hidden.recipe import Recipe
+from shared.identification.noise.floor import noise_of
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    """An arm under torques whose residuals are without what first states may be off by."""
+    dataset, _ = simulated(Recipe(arm="torque2", seconds=4.0, train=2, test=1, seed=5))
+    subject = subject_of(dataset)
+    noise = replace(noise_of(dataset, BLOCK, subject.starts, subject.nominal), memory=None)
+    free = replace(noise, has_free_starts=True)
+    return Problem(subject, dataset, base_parameters(subject), free)
+
+
+def elsewhere(problem: Problem, by: float) -> Problem:
+    """Return the same with parts that begin elsewhere, and faster (rad, rad/s)."""
+    other = replace(problem)
+    other.segments = tuple(
+        replace(
+            each,
+            recorded=replace(
+                each.recorded,
+                initial_q=each.recorded.initial_q + 0.1 * by,
+                initial_qd=each.recorded.initial_qd - by,
+            ),
+        )
+        for each in other.segments
+    )
+    return other
+
+
+def test_a_first_state_that_is_off_leaves_residuals_as_they_are(problem: Problem):
+    nominal, train = Variant(np.zeros(len(problem.parameters))), problem.of("train")
+    plain = replace(problem, noise=replace(problem.noise, has_free_starts=False))
+    changed = [
+        elsewhere(each, 0.01).vector([nominal], train) - each.vector([nominal], train)
+        for each in (problem, plain)
+    ]
+    free, held = (float(np.sqrt(np.mean(each**2))) for each in changed)
+    assert free < 0.05 * held
+    assert held > 0.1
+
+
+def test_residuals_keep_what_no_first_state_makes_up_for(problem: Problem):
+    train = problem.of("train")
+    nominal = Variant(np.zeros(len(problem.parameters)))
+    stiffer = Variant(np.r_[0.5, np.zeros(len(problem.parameters) - 1)])
+    before, after = problem.vector([nominal, stiffer], train)
+    assert np.mean((after - before) ** 2) > 0.01
+    assert np.mean(after**2) > np.mean(before**2)
+
+
+def test_each_part_is_asked_for_once(problem: Problem, monkeypatch: pytest.MonkeyPatch):
+    starts = FreeStarts(problem.subject.nominal, as_it_is)
+    parts = [each.recorded for each in problem.segments[:2]]
+    first = starts.of(parts)
+    monkeypatch.setattr(problem.subject.nominal, "run", lambda work: [] if not work else 1 / 0)
+    again = starts.of(parts[::-1])
+    assert again[0] is first[1]
+    assert again[1] is first[0]
+    assert first[0].joints.shape[1:] == (2, 4)
+
+
+def test_directions_are_orthonormal_and_nothing_is_left_along_them():
+    rng = np.random.default_rng(0)
+    columns = rng.standard_normal((20, 3))
+    along = directions(np.c_[columns, columns[:, :1] - columns[:, 1:2]])
+    assert along.shape == (20, 3)
+    assert along.T @ along == pytest.approx(np.eye(3), abs=1e-12)
+    values = rng.standard_normal((10, 2))
+    left = across(values, along)
+    assert columns.T @ left.ravel() == pytest.approx(np.zeros(3), abs=1e-12)
+    assert across(left, along) == pytest.approx(left)
