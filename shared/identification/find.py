@@ -41,7 +41,6 @@ from shared.telemetry.wording import listing
 
 _LITTLE = 4.0
 """Mean square residual, in noise floors, up to which a time step may be all that is wrong."""
-
 _STEP_SHOWS = 0.5
 """Root mean square of a joint, in noise floors, by which a time step shows where no start does."""
 
@@ -100,13 +99,16 @@ def identify(
     def folder_of(name: str) -> Path | None:
         return None if resume_folder is None else resume_folder / name
 
+    def begun_at(step: float, aside: tuple[Span, ...] = ()) -> Search:
+        progress("base fit", 0.0, f"again, at a time step of {1e3 * step:g} ms")
+        return begun(with_timestep(dataset, step), folder_of("shorter_step"), aside)
+
     begins = begun(dataset, resume_folder)
     if (
         begins.problem.noise.has_free_starts
         and (step := shorter(begins.base, _STEP_SHOWS)) is not None
     ):
-        progress("base fit", 0.0, f"again, at a time step of {1e3 * step:g} ms")
-        begins = begun(with_timestep(dataset, step), folder_of("shorter_step"))
+        begins = begun_at(step)
     found, left = _searched(begins, run)
     if is_open(found) and (aside := pushed_in(found, left)):
         names = listing(sorted({each.trajectory for each in aside}))
@@ -116,10 +118,7 @@ def identify(
         if other.plainly.least < found.plainly.least:
             found, left = other, other_left
     if _may_be_its_step(found) and (step := shorter(found.base)) is not None:
-        progress("base fit", 0.0, f"again, at a time step of {1e3 * step:g} ms")
-        aside = found.problem.aside
-        other = begun(with_timestep(dataset, step), folder_of("shorter_step"), aside)
-        other, other_left = _searched(other, run)
+        other, other_left = _searched(begun_at(step, found.problem.aside), run)
         if not is_open(other):
             found, left = other, other_left
     if is_open(found) and may_be_beyond(found.problem.dataset):

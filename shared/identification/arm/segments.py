@@ -63,6 +63,21 @@ def _segments(
     if cut is None or not len(spans):
         known = (trajectory.initial_q, trajectory.initial_qd)
         return [_segment(index, trajectory, 0.0, np.inf, known)]
+    return parts_at(index, trajectory, spans, cut, timestep)
+
+
+def parts_at(
+    index: int, trajectory: Trajectory, spans: Float64, cut: Cut, timestep: float
+) -> list[Segment]:
+    """Return parts of a recording, each from its measured state.
+
+    Args:
+        index: of the recording.
+        trajectory: itself.
+        spans: float64[P, 2], when they begin and end (s).
+        cut: says how many readings a state is taken from.
+        timestep: of the physics that goes on from there (s).
+    """
     states = states_of(trajectory, spans[:, 0], timestep, cut)
     return [
         _segment(index, trajectory, float(begin), float(end), state)

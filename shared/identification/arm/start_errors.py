@@ -16,7 +16,6 @@ import numpy as np
 from shared.identification.dataset.types import Float64
 from shared.sim.plant.replay import Recorded
 from shared.sim.plant.rollouts import Entry, Rollouts
-from shared.sim.plant.row import Row
 from shared.sim.plant.signals import pose_error
 
 _POSITION = 3e-4
@@ -59,13 +58,7 @@ class FreeStarts:
         return [self._known[key] for key in keys]
 
 
-def as_it_is(_: Row) -> None:
-    """Change nothing of the nominal arm."""
-
-
-def start_errors(
-    arms: Rollouts, parts: Sequence[Recorded], entry: Entry = as_it_is
-) -> list[StartErrors]:
+def start_errors(arms: Rollouts, parts: Sequence[Recorded], entry: Entry) -> list[StartErrors]:
     """Return what parts are off by where their first states are.
 
     Args:

@@ -14,8 +14,7 @@ import numpy as np
 from shared.identification.arm.parts import Cut, part_of, spans_of, states_of
 from shared.identification.dataset.types import Float64, Trajectory
 from shared.sim.plant.replay import Recorded, Reports
-from shared.sim.plant.rollouts import Rollouts
-from shared.sim.plant.row import Row
+from shared.sim.plant.rollouts import Rollouts, as_it_is
 from shared.sim.plant.signals import pose_error
 
 LEAST = 2e-3
@@ -98,7 +97,7 @@ def _apart(nominal: Rollouts, of: Trajectory, pairs: Sequence[_Pair]) -> Apart:
             replace(pair.second, joints_at=pair.first.joints_at, tracker_at=pair.first.tracker_at),
         )
     ]
-    found = nominal.run([(_as_it_is, part) for part in work])
+    found = nominal.run([(as_it_is, part) for part in work])
     joints = np.full_like(of.q, np.nan)
     tracker = None if of.tracker is None else np.full((len(of.tracker), 6), np.nan)
     for pair, one, other in zip(pairs, found[::2], found[1::2], strict=True):
@@ -112,7 +111,3 @@ def _tracker_apart(one: Reports, other: Reports) -> Float64:
     assert one.tracker is not None
     assert other.tracker is not None
     return np.nan_to_num(pose_error(one.tracker, other.tracker))
-
-
-def _as_it_is(_: Row) -> None:
-    """Change nothing of the nominal arm."""

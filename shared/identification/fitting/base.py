@@ -121,14 +121,13 @@ def fit_base(space: Space, rng: np.random.Generator) -> BaseFits:
 
 def with_starts(done: BaseFits) -> BaseFits:
     """Return a base's fit whose first states are as free as the fit itself answers them."""
+    whole, segments = done.whole, done.whole.space.problem.of("train")
     for _ in range(_STARTS):
-        space = _starting_as(done.whole.space, done.whole.z)
-        segments, origin = space.problem.of("train"), np.zeros(space.size)
-        whole = polish(space, done.whole.z, segments, 3)
-        whole = replace(whole, starts_agree=done.whole.starts_agree)
-        nominal = Start(origin, space.jacobian(origin, segments, is_rough=True)[1])
-        done = BaseFits(nominal, whole, whole)
-    return done
+        whole = polish(_starting_as(whole.space, whole.z), whole.z, segments, 3)
+    whole = replace(whole, starts_agree=done.whole.starts_agree)
+    origin = np.zeros(whole.space.size)
+    nominal = Start(origin, whole.space.jacobian(origin, segments, is_rough=True)[1])
+    return BaseFits(nominal, whole, whole)
 
 
 def _starting_as(space: Space, z: Float64) -> Space:

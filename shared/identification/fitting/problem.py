@@ -12,22 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.identification.arm.segments import Segment, segments_of
-from shared.identification.arm.start_errors import (
-    FreeStarts,
-    StartErrors,
-    across,
-    as_it_is,
-    directions,
-)
+from shared.identification.arm.start_errors import FreeStarts, StartErrors, across, directions
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Dataset, Float64
 from shared.identification.effect import Candidate
 from shared.identification.fitting.parameters import BaseParameter, enter_base
+from shared.identification.noise.blocks import Bins, beside
 from shared.identification.noise.floor import Noise
 from shared.sim.plant.inverse import model_of, reluctance
 from shared.sim.plant.plant import stepped
 from shared.sim.plant.replay import Reports
-from shared.sim.plant.rollouts import Entry, Rollouts
+from shared.sim.plant.rollouts import Entry, Rollouts, as_it_is
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import pose_error, smoothed
 from shared.sim.plant.structure import Structure
@@ -83,13 +78,14 @@ class Problem:
     aside: tuple[Span, ...] = ()
     """What nothing is fitted to, since something outside acted there."""
     free_starts: FreeStarts | None = None
-    """What parts are off by where they begin; of the nominal arm, unless another one is given."""
+    """What parts are off by where they begin, where noise is without it; of the nominal arm, unless
+    another one is given."""
     segments: tuple[Segment, ...] = field(init=False)
     _arms: dict[tuple[Structure, float], Rollouts] = field(
         default_factory=dict[tuple[Structure, float], Rollouts]
     )
     """Compiled, by what effects have added and by time step."""
-    _bins: dict[int, tuple["_Bins", "_Bins | None"]] = field(init=False)
+    _bins: dict[int, tuple[Bins, Bins | None]] = field(init=False)
     _whitening: dict[int, Float64 | None] = field(init=False)
     _starts: dict[int, Float64] = field(init=False)
     """float64[B C, K] by segment, along which first states may be off; where they are free."""
@@ -100,12 +96,14 @@ class Problem:
         self._bins = {}
         self._whitening = {}
         self._starts = {}
-        if self.noise.has_free_starts and self.free_starts is None:
+        if not self.noise.has_free_starts:
+            self.free_starts = None
+        elif self.free_starts is None:
             self.free_starts = FreeStarts(self.subject.nominal, as_it_is)
         for index, segment in enumerate(self.segments):
             recorded = segment.recorded
-            tracker = None if recorded.tracker_at is None else _Bins.of(recorded.tracker_at)
-            of_joints = _Bins.of(recorded.joints_at)
+            tracker = None if recorded.tracker_at is None else Bins.of(recorded.tracker_at, BLOCK)
+            of_joints = Bins.of(recorded.joints_at, BLOCK)
             self._bins[index] = (of_joints, tracker)
             q = of_joints.mean(segment.q)
             self._whitening[index] = self.noise.whitening(self.subject.nominal, q)
@@ -358,15 +356,13 @@ class Problem:
         if weight is not None:
             out = weight * out
         if tracker is not None and of_tracker is not None and self.noise.tracker is not None:
-            more = of_tracker.mean(tracker) / self.noise.tracker
-            rows = min(len(out), len(more))
-            out = np.concatenate([out[:rows], more[:rows]], axis=1)
+            out = beside(out, of_tracker.mean(tracker) / self.noise.tracker)
         out = np.nan_to_num(out, nan=DIVERGED, posinf=DIVERGED, neginf=-DIVERGED)
         return across(out, self._starts[segment]) if segment in self._starts else out
 
     def _free_starts(self, segments: Sequence[int]) -> None:
         """See to it that it is known of segments what they are off by where they begin."""
-        if not self.noise.has_free_starts or self.free_starts is None:
+        if self.free_starts is None:
             return
         new = [each for each in segments if each not in self._starts]
         errors = self.free_starts.of([self.segments[each].recorded for each in new])
@@ -378,9 +374,7 @@ class Problem:
         of_joints, of_tracker = self._bins[segment]
         out = of_joints.mean(error.joints) / self.noise.joints[:, None]
         if error.tracker is not None and of_tracker is not None and self.noise.tracker is not None:
-            more = of_tracker.mean(error.tracker) / self.noise.tracker[:, None]
-            rows = min(len(out), len(more))
-            out = np.concatenate([out[:rows], more[:rows]], axis=1)
+            out = beside(out, of_tracker.mean(error.tracker) / self.noise.tracker[:, None])
         return out.reshape(-1, out.shape[-1])
 
     def entry(self, variant: Variant) -> Entry:
@@ -397,22 +391,3 @@ class _Enter:
         enter_base(self.parameters, self.variant.x, row)
         for candidate, values in self.variant.extras:
             candidate.effect.enter(row, candidate.place, values)
-
-
-@dataclass(frozen=True)
-class _Bins:
-    """Which readings are averaged."""
-
-    starts: np.ndarray
-    counts: Float64
-
-    @staticmethod
-    def of(at: Float64) -> "_Bins":
-        number = np.floor((at - at[0]) / BLOCK + 1e-6).astype(np.int64)
-        starts = np.flatnonzero(np.r_[True, np.diff(number) > 0])
-        return _Bins(starts, np.diff(np.r_[starts, len(at)]).astype(np.float64)[:, None])
-
-    def mean(self, values: Float64) -> Float64:
-        """Return float64[B, ...] of float64[T, ...]."""
-        counts = self.counts.reshape(-1, *(1,) * (values.ndim - 1))
-        return np.add.reduceat(values, self.starts, axis=0) / counts

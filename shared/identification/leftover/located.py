@@ -27,6 +27,7 @@ from shared.identification.leftover.pushes import Push, is_one_way, pushes_of
 from shared.identification.leftover.scan import Width, merged, scan, stretches, width_of
 from shared.identification.leftover.tracks import Track, missing_of, tracks_of
 from shared.identification.noise.floor import repeat_differences
+from shared.identification.noise.quiet import OF_PAIR
 from shared.identification.verdict import Unexplained
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.signals import pose_error
@@ -121,7 +122,7 @@ def _widths(problem: Problem) -> tuple[Width, Width | None]:
     )
     of_joints = width_of(
         [
-            noise.floors(each.joints * np.sqrt(0.5), noise.whitening(subject.nominal, each.q))
+            noise.floors(each.joints * OF_PAIR, noise.whitening(subject.nominal, each.q))
             for each in pairs
         ],
         noise.correlation[:count],
@@ -131,7 +132,7 @@ def _widths(problem: Problem) -> tuple[Width, Width | None]:
         return of_joints, None
     floor = noise.tracker
     return of_joints, width_of(
-        [each.tracker * np.sqrt(0.5) / floor for each in pairs if each.tracker is not None],
+        [each.tracker * OF_PAIR / floor for each in pairs if each.tracker is not None],
         noise.correlation[count : count + 6],
         noise.is_measured,
     )

@@ -22,7 +22,7 @@ from shared.identification.noise.blocks import block_means
 from shared.identification.noise.drift import Drift, drift_of
 from shared.identification.noise.memory import Memory, memory_of, wandering
 from shared.identification.noise.pushed import Pushed, pushed_of, whitening
-from shared.identification.noise.quiet import level_of
+from shared.identification.noise.quiet import OF_PAIR, level_of
 from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.signals import pose_error, sampled, sampled_poses
 
@@ -33,8 +33,6 @@ _BAND = 25
 """Without repeats: readings that a local cubic is taken through."""
 _FEWEST = 10
 """Readings that two recordings have to share, else the last of the shorter one is held."""
-_OF_PAIR = np.sqrt(0.5)
-"""Of what two recordings differ by, that is the noise of one."""
 _AXES = (slice(0, 3), slice(3, 6))
 """Of a tracker's error: how far off it is along each, and about each."""
 _ROUND = np.sqrt(12.0)
@@ -138,12 +136,15 @@ def noise_of(
         starts: what repeats differ by for starting elsewhere.
         nominal: the arm; None for one that is held by its joints.
     """
+    rounding = steps_of([each.q for each in dataset.trajectories]) / _ROUND
+    if nominal is not None and (answered := _answered(dataset, nominal, rounding, block)):
+        return answered
     cut = None if nominal is None else CUTS.get(nominal.plant.control)
     pairs = repeat_differences(dataset, block, starts, cut)
     joints = [each.joints for each in pairs]
     tracker = [each.tracker for each in pairs if each.tracker is not None]
     if pairs:
-        scale = _OF_PAIR
+        scale = OF_PAIR
     else:
         joints = [block_means(each.joints_at, _fast(each.joints_at, each.q), block)
                   for each in dataset.trajectories]  # fmt: skip
@@ -154,7 +155,6 @@ def noise_of(
         ]
         scale = 1.0
     of_joints, joint_correlation = level_of(joints, scale)
-    rounding = steps_of([each.q for each in dataset.trajectories]) / _ROUND
     of_joints = np.maximum(of_joints, rounding)
     of_tracker, correlation = None, joint_correlation
     if dataset.has_tracker and tracker:
@@ -177,13 +177,15 @@ def noise_of(
         correlation = np.r_[correlation, found.correlation[len(whitened) :]]
         found = replace(unit, whitened=whitened, correlation=correlation)
         hidden = np.zeros(len(whitened))
-    return _remembered(found, pairs, nominal, hidden, dataset, block)
+    return _remembered(found, pairs, nominal, hidden)
 
 
 def _remembered(
-    noise: Noise, pairs: Sequence[Difference], nominal: Rollouts | None, rounding: Float64,
-    dataset: Dataset, block: float,
-) -> Noise:  # fmt: skip
+    noise: Noise,
+    pairs: Sequence[Difference],
+    nominal: Rollouts | None,
+    rounding: Float64,
+) -> Noise:
     """Return the noise with how much of it is carried on, or how it grows.
 
     Args:
@@ -191,8 +193,6 @@ def _remembered(
         pairs: what repeats differ by.
         nominal: the arm; None for one that is held by its joints.
         rounding: float64[J], what an encoder's steps hide, in noise floors.
-        dataset: the recordings.
-        block: what residuals are averaged over (s).
     """
     joints: list[Float64] = []
     tracker: list[Float64] = []
@@ -204,34 +204,38 @@ def _remembered(
         tracker += _split(each.tracker / noise.tracker, each.tracker_parts)
     no_steps = np.zeros(0 if noise.tracker is None else len(noise.tracker))
     if nominal is not None and nominal.plant.control == "torque":
-        if answers(dataset) and (found := _answered(noise, nominal, dataset, rounding, block)):
-            return found
-        drift = drift_of(joints, _OF_PAIR, rounding)
-        seen = drift_of(tracker, _OF_PAIR, no_steps) if tracker else None
+        drift = drift_of(joints, OF_PAIR, rounding)
+        seen = drift_of(tracker, OF_PAIR, no_steps) if tracker else None
         if drift is not None and (noise.tracker is None or seen is not None):
             blocks = max(len(each) for each in joints)
             return noise.growing(drift if seen is None else drift.beside(seen), blocks)
-    found = memory_of(joints, _OF_PAIR, rounding)
+    found = memory_of(joints, OF_PAIR, rounding)
     if noise.tracker is not None:
-        seen = memory_of(tracker, _OF_PAIR, no_steps)
-        found = found.beside(wandering(seen, tracker, _OF_PAIR, _AXES))
+        seen = memory_of(tracker, OF_PAIR, no_steps)
+        found = found.beside(wandering(seen, tracker, OF_PAIR, _AXES))
     return replace(noise, memory=found)
 
 
-def _answered(
-    noise: Noise, nominal: Rollouts, dataset: Dataset, rounding: Float64, block: float
-) -> Noise | None:
-    """Return the noise beyond first states; None of recordings too short for parts."""
-    cut = CUTS[nominal.plant.control]
-    found = answered_noise(dataset, nominal, cut, block)
+def _answered(dataset: Dataset, nominal: Rollouts, rounding: Float64, block: float) -> Noise | None:
+    """Return the noise beyond first states; None where commands do not answer, or parts are none.
+
+    Args:
+        dataset: the recordings.
+        nominal: the arm.
+        rounding: float64[J], what an encoder's steps hide (rad, m).
+        block: what residuals are averaged over (s).
+    """
+    if nominal.plant.control != "torque" or not answers(dataset):
+        return None
+    found = answered_noise(dataset, nominal, CUTS["torque"], block)
     if found is None:
         return None
-    count = len(noise.joints)
-    return replace(
-        noise,
-        joints=np.maximum(found.levels[:count], rounding * noise.joints),
-        tracker=None if noise.tracker is None else found.levels[count:],
+    count = len(rounding)
+    return Noise(
+        joints=np.maximum(found.levels[:count], rounding),
+        tracker=found.levels[count:] if dataset.has_tracker else None,
         correlation=found.correlation,
+        is_measured=True,
         has_free_starts=True,
     )
 

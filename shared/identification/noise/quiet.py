@@ -12,6 +12,8 @@ import numpy as np
 
 from shared.identification.dataset.types import Float64
 
+OF_PAIR = np.sqrt(0.5)
+"""Of what two recordings differ by, that is the noise of one."""
 _STRETCH = 25
 """Blocks whose power is looked at together."""
 _SAMPLES = 200

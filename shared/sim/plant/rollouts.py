@@ -29,6 +29,10 @@ Entry = Callable[[Row], None]
 """Lets base parameters and effects into one arm."""
 
 
+def as_it_is(_: Row) -> None:
+    """Change nothing of the nominal arm."""
+
+
 class Rollouts:
     """Arms of one structure, kept compiled."""
 

@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shared.identification.arm.start_errors import FreeStarts, across, as_it_is, directions
+from shared.identification.arm.start_errors import FreeStarts, across, directions
 from shared.identification.arm.subject import subject_of
 from shared.identification.fitting.parameters import base_parameters
 from shared.identification.fitting.problem import BLOCK, Problem, Variant
 from shared.identification.hidden.generator import simulated
 from shared.identification.hidden.recipe import Recipe
 from shared.identification.noise.floor import noise_of
+from shared.sim.plant.rollouts import as_it_is
 
 
 @pytest.fixture(scope="module")
