@@ -113,7 +113,7 @@ def identify(
     if is_open(found) and (aside := pushed_in(found, left)):
         names = listing(sorted({each.trajectory for each in aside}))
         progress("base fit", 0.0, f"again, without what was pushed in {names}")
-        other = begun(dataset, folder_of("without_pushes"), aside)
+        other = begun(found.problem.dataset, folder_of("without_pushes"), aside)
         other, other_left = _searched(other, run, _pushes(left))
         if other.plainly.least < found.plainly.least:
             found, left = other, other_left
