@@ -104,14 +104,35 @@ def _payload(arm: Arm, joint: int, size: float) -> Fault:
     value = 0.25 * size * sum(link.mass for link in arm.links[-2:])
 
     def edit(model: mujoco.MjModel) -> None:
-        body, at = model.nbody - 1, model.site("tool").pos
-        own = float(model.body_mass[body])
-        centre = (own * model.body_ipos[body] + value * at) / (own + value)
-        model.body_inertia[body] += value * np.sum((at - centre) ** 2)
-        model.body_mass[body], model.body_ipos[body] = own + value, centre
-        mujoco.mj_setConst(model, mujoco.MjData(model))
+        hang(model, model.nbody - 1, model.site("tool").pos, value)
 
     return Fault("payload", "", value, "kg", edit=edit)
+
+
+def hang(model: mujoco.MjModel, body: int, at: Float64, mass: float) -> None:
+    """Fix a point mass to a body of an arm (Steiner's theorem about the centre of both).
+
+    Args:
+        model: compiled.
+        body: its number.
+        at: float64[3], where on the body (m).
+        mass: of the point (kg).
+    """
+    own, apart = float(model.body_mass[body]), at - model.body_ipos[body]
+    share = mass / (own + mass)
+    more = own * share * (apart @ apart * np.eye(3) - np.outer(apart, apart))
+    axes = np.zeros(9)
+    mujoco.mju_quat2Mat(axes, model.body_iquat[body])
+    turned = axes.reshape(3, 3)
+    principal, vectors = np.linalg.eigh(
+        turned @ np.diag(model.body_inertia[body]) @ turned.T + more
+    )
+    vectors[:, 0] *= np.sign(np.linalg.det(vectors))  # a rotation, no mirror
+    mujoco.mju_mat2Quat(model.body_iquat[body], vectors.ravel())
+    model.body_inertia[body] = principal
+    model.body_mass[body] = own + mass
+    model.body_ipos[body] += share * apart
+    mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
 def _weak(arm: Arm, joint: int, size: float) -> Fault:
