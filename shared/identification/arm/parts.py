@@ -1,11 +1,12 @@
 """Parts of one recording, each replayed from the state that was measured when it begins."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from shared.identification.arm.motion import smooth_motion
-from shared.identification.arm.smoothing import smooth_states
+from shared.identification.arm.smoothing import smooth, smooth_states
 from shared.identification.dataset.types import Float64, Trajectory
 from shared.sim.plant.plant import Control
 from shared.sim.plant.replay import Recorded
@@ -42,6 +43,9 @@ _PLACES = 11
 """Begins of a part that are looked at."""
 _CLEAR = 0.7
 """Of what a state is taken from: a kink that far away does not matter."""
+_DOUBT = 3.0
+"""Standard deviations for one of a state, that readings would have if they were off one by one:
+those of an encoder's steps go together, and a motion is no polynomial."""
 
 
 def width_of(period: float, cut: Cut) -> int:
@@ -85,6 +89,34 @@ def states_of(
     # speed is given half a step before the position (Stormer and Verlet's method).
     before = sampled(even, speed, instants - 0.5 * timestep)
     return list(zip(sampled(even, position, instants), before, strict=True))
+
+
+def states_doubt(trajectories: Sequence[Trajectory], rounding: Float64, cut: Cut) -> Float64 | None:
+    """Return float64[2, J], standard deviations of what :func:`states_of` returns.
+
+    By what the readings around are off their polynomials by.
+
+    Args:
+        trajectories: the recordings; None where all are too short to be cut.
+        rounding: float64[J], what an encoder's steps hide (rad, m).
+        cut: says how many readings a fit is of.
+    """
+    found: list[Float64] = []
+    for each in trajectories:
+        even, period = _even(each), _period(each)
+        width = width_of(period, cut)
+        if len(even) <= 2 * width:
+            continue
+        q = sampled(each.joints_at, each.q, even)
+        off = q - smooth_states(q, width, period)[0]
+        one = np.eye(4 * width + 1)[:, 2 * width : 2 * width + 1]
+        own = float(smooth(one, width)[2 * width, 0])
+        reading = np.maximum(np.sqrt(np.mean(off**2, axis=0) / (1.0 - own)), rounding)
+        weights = [np.linalg.norm(smooth(one, width, rate)) for rate in (None, period)]
+        found.append(np.asarray(_DOUBT * np.outer(weights, reading), np.float64))
+    if not found:
+        return None
+    return np.sqrt(np.mean(np.square(found), axis=0))
 
 
 def part_of(

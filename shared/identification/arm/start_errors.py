@@ -3,9 +3,10 @@
 A part is replayed from a state that is measured: positions to a fraction of a reading, speeds from
 what a few readings around differ by. Nothing takes a wrong speed away where nothing holds the arm,
 so at the end of a part it is off by ten times what a reading is off by, the same way for a right
-model as for a wrong one. What first states can be off by is known, as the arm answers it: a
-residual says nothing of a model along that, and all it can say across it. That is what a fit with
-first states of its own for every part would leave (multiple shooting; Bock 1983).
+model as for a wrong one. What first states can be off by is known, as the arm answers it: along
+that a residual says the less of a model the less is known of them, and all it can say across it.
+That is what a fit with first states of its own for every part would leave (multiple shooting; Bock
+1983), each held to what was measured as far as that is known.
 """
 
 from collections.abc import Sequence
@@ -24,13 +25,14 @@ _SPEED = 3e-3
 """By which it is made faster, in what it travels (1/s)."""
 _LEAST_TRAVEL = 0.01
 """Of a joint that hardly moves (rad, m)."""
-_NOTHING = 1e-8
-"""Of the largest singular value: what is less is no direction."""
 
 
 @dataclass(frozen=True)
 class StartErrors:
-    """What readings change by, one column for each joint's position, then for each one's speed."""
+    """What readings change by for a first state that is off by 1.
+
+    One column for each joint's position (rad, m), then for each one's speed (rad/s, m/s).
+    """
 
     joints: Float64
     """float64[T, J, K]."""
@@ -72,26 +74,41 @@ def start_errors(arms: Rollouts, parts: Sequence[Recorded], entry: Entry) -> lis
     for part in parts:
         count = 1 + 2 * len(part.initial_q)
         own, others, found = found[0], found[1:count], found[count:]
-        joints = np.stack([each.q - own.q for each in others], axis=-1)
+        by = np.outer([_POSITION, _SPEED], _travel(part)).ravel()
+        joints = np.stack([each.q - own.q for each in others], axis=-1) / by
         tracker = None
         if own.tracker is not None:
             moved = [pose_error(each.tracker, own.tracker) for each in others
                      if each.tracker is not None]  # fmt: skip
-            tracker = np.nan_to_num(np.stack(moved, axis=-1))
+            tracker = np.nan_to_num(np.stack(moved, axis=-1)) / by
         out.append(StartErrors(np.nan_to_num(joints), tracker))
     return out
 
 
-def directions(columns: Float64) -> Float64:
-    """Return float64[N, K'], orthonormal: what columns float64[N, K] span."""
-    left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(left[:, sizes > _NOTHING * max(sizes[0], 1e-300)], np.float64)
+@dataclass(frozen=True)
+class Doubt:
+    """What there is in residuals of one part that its first state could be."""
 
+    along: Float64
+    """float64[N, K], orthonormal, of N numbers."""
+    kept: Float64
+    """float64[K], share of a residual along each that is left."""
 
-def across(values: Float64, along: Float64) -> Float64:
-    """Return values, float64[B, C], without what they have along directions, float64[B C, K]."""
-    flat = values.ravel()
-    return np.asarray((flat - along @ (along.T @ flat)).reshape(values.shape), np.float64)
+    @classmethod
+    def of(cls, columns: Float64) -> "Doubt":
+        """Return it of columns float64[..., K], standard deviations of each number by its noise."""
+        along, sizes, _ = np.linalg.svd(columns.reshape(-1, columns.shape[-1]), full_matrices=False)
+        return cls(along, 1.0 / np.hypot(1.0, sizes))
+
+    def without(self, values: Float64) -> Float64:
+        """Return N values as they would be of noise alone: white if they are no more than that.
+
+        Their covariance is 1 and, along each direction, the square of how far first states lead
+        there: by the root of its inverse.
+        """
+        flat = values.ravel()
+        less = self.along @ ((1.0 - self.kept) * (self.along.T @ flat))
+        return np.asarray((flat - less).reshape(values.shape), np.float64)
 
 
 def _travel(part: Recorded) -> Float64:

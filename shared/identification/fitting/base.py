@@ -13,6 +13,8 @@ from shared.identification.fitting.space import Space
 from shared.identification.noise.floor import Noise
 from shared.sim.plant.plant import Control
 
+_FLOORS = 3
+"""Times that a floor is asked for again."""
 _MEDIAN = 0.455
 """Of the square of a normal number of variance 1."""
 WINDOW = 1.0
@@ -44,7 +46,17 @@ def floor_from_base(space: Space) -> Noise:
 
 
 def floor_at(space: Space, z: Float64) -> Noise:
-    """Return the same from what is left at a vector, float64[n]."""
+    """Return the same from what is left at a vector, float64[n].
+
+    Where first states are free it says how much of that they may be, so it is asked again.
+    """
+    noise = _floor_at(space, z)
+    for _ in range(_FLOORS if noise.has_free_starts else 0):
+        noise = _floor_at(Space(replace(space.problem, noise=noise), space.candidates), z)
+    return noise
+
+
+def _floor_at(space: Space, z: Float64) -> Noise:
     parts = _on_parts(space)
     problem, noise = parts.problem, parts.problem.noise
     each = problem.residuals([parts.variant(z)], problem.of("train"))[0]

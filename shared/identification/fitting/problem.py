@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shared.identification.arm.segments import Segment, segments_of
-from shared.identification.arm.start_errors import FreeStarts, StartErrors, across, directions
+from shared.identification.arm.start_errors import Doubt, FreeStarts, StartErrors
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Dataset, Float64
 from shared.identification.effect import Candidate
@@ -88,7 +88,9 @@ class Problem:
     _bins: dict[int, tuple[Bins, Bins | None]] = field(init=False)
     _whitening: dict[int, Float64 | None] = field(init=False)
     _starts: dict[int, Float64] = field(init=False)
-    """float64[B C, K] by segment, along which first states may be off; where they are free."""
+    """float64[B, C, K] by segment, noise floors that first states are off by; where that counts."""
+    _doubts: dict[int, Doubt] = field(init=False)
+    """The same as it is taken off residuals, all blocks of which count."""
 
     def __post_init__(self) -> None:
         self.segments = segments_of(self.dataset, self.subject, self.window)
@@ -96,6 +98,7 @@ class Problem:
         self._bins = {}
         self._whitening = {}
         self._starts = {}
+        self._doubts = {}
         if not self.noise.has_free_starts:
             self.free_starts = None
         elif self.free_starts is None:
@@ -358,7 +361,20 @@ class Problem:
         if tracker is not None and of_tracker is not None and self.noise.tracker is not None:
             out = beside(out, of_tracker.mean(tracker) / self.noise.tracker)
         out = np.nan_to_num(out, nan=DIVERGED, posinf=DIVERGED, neginf=-DIVERGED)
-        return across(out, self._starts[segment]) if segment in self._starts else out
+        return self._beyond_starts(out, segment) if segment in self._starts else out
+
+    def _beyond_starts(self, out: Float64, segment: int) -> Float64:
+        """Return residuals without what a part's first state may be off by.
+
+        Blocks that no loss counts have no say in that, and stay as they are.
+        """
+        uncounted = self.uncounted.get(segment)
+        if uncounted is None or not uncounted.any():
+            return self._doubts[segment].without(out)
+        if not uncounted.all():
+            columns = self._starts[segment][~uncounted]
+            out[~uncounted] = Doubt.of(columns).without(out[~uncounted])
+        return out
 
     def _free_starts(self, segments: Sequence[int]) -> None:
         """See to it that it is known of segments what they are off by where they begin."""
@@ -367,15 +383,17 @@ class Problem:
         new = [each for each in segments if each not in self._starts]
         errors = self.free_starts.of([self.segments[each].recorded for each in new])
         for segment, error in zip(new, errors, strict=True):
-            self._starts[segment] = directions(self._in_floors_of(error, segment))
+            columns = self._in_floors_of(error, segment)
+            self._starts[segment], self._doubts[segment] = columns, Doubt.of(columns)
 
     def _in_floors_of(self, error: StartErrors, segment: int) -> Float64:
-        """Return float64[B C, K], columns of start errors as :meth:`floors` has residuals."""
+        """Return float64[B, C, K]: what starts are off by, in floors as residuals are."""
         of_joints, of_tracker = self._bins[segment]
         out = of_joints.mean(error.joints) / self.noise.joints[:, None]
         if error.tracker is not None and of_tracker is not None and self.noise.tracker is not None:
             out = beside(out, of_tracker.mean(error.tracker) / self.noise.tracker[:, None])
-        return out.reshape(-1, out.shape[-1])
+        doubt = self.noise.start_doubt
+        return out if doubt is None else out * doubt.ravel()
 
     def entry(self, variant: Variant) -> Entry:
         """Return what lets a variant into an arm."""

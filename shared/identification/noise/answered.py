@@ -13,7 +13,7 @@ import numpy as np
 
 from shared.identification.arm.parts import Cut, spans_of
 from shared.identification.arm.segments import Segment, parts_at
-from shared.identification.arm.start_errors import across, directions, start_errors
+from shared.identification.arm.start_errors import Doubt, start_errors
 from shared.identification.dataset.programmes import difference
 from shared.identification.dataset.types import Dataset, Float64, Trajectory
 from shared.identification.noise.blocks import beside, block_means
@@ -24,6 +24,9 @@ from shared.sim.plant.signals import pose_error
 
 _SAME = 1e-3
 """Share of their movement by which commands differ that are the same but for rounding."""
+_TINY = 1e-12
+"""Less than any noise (rad, m)."""
+_ROUNDS = 4
 _LOUD = 4.0
 """Times the usual power, from which a part has no more of a say than that."""
 
@@ -48,7 +51,9 @@ def answers(dataset: Dataset) -> bool:
     )
 
 
-def answered_noise(dataset: Dataset, nominal: Rollouts, cut: Cut, block: float) -> Answered | None:
+def answered_noise(
+    dataset: Dataset, nominal: Rollouts, cut: Cut, block: float, starts: Float64
+) -> Answered | None:
     """Return the noise floor beyond first states; None of recordings too short for parts.
 
     Args:
@@ -56,6 +61,7 @@ def answered_noise(dataset: Dataset, nominal: Rollouts, cut: Cut, block: float) 
         nominal: the arm.
         cut: says how recordings are replayed in parts.
         block: what residuals are averaged over (s).
+        starts: float64[2, J], standard deviations of first states.
     """
     by_name = {each.name: each for each in dataset.trajectories}
     found: list[tuple[Float64, Float64]] = []
@@ -65,12 +71,16 @@ def answered_noise(dataset: Dataset, nominal: Rollouts, cut: Cut, block: float) 
             found += _differences(first, second, cut, nominal, block, dataset.has_tracker)
     if not found:
         return None
-    unit = np.sqrt(np.mean(np.concatenate([off for off, _ in found]) ** 2, axis=0)) + 1e-12
-    left = [
-        unit * across(off / unit, directions((columns / unit[:, None]).reshape(off.size, -1)))
-        for off, columns in found
-    ]
-    return Answered(_level_of(left), _correlation_of(left))
+    level = np.full(found[0][0].shape[1], _TINY)
+    left: list[Float64] = []
+    for _ in range(_ROUNDS):  # what is noise and what a first state depends on either
+        unit = level[:, None]
+        left = [
+            level * Doubt.of(columns * starts.ravel() / unit).without(off / level)
+            for off, columns in found
+        ]
+        level = np.maximum(_level_of(left), _TINY)
+    return Answered(level, _correlation_of(left))
 
 
 def _level_of(parts: Sequence[Float64]) -> Float64:

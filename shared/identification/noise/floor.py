@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from shared.identification.arm.parts import CUTS, Cut, spans_of
+from shared.identification.arm.parts import CUTS, Cut, spans_of, states_doubt
 from shared.identification.arm.smoothing import smooth
 from shared.identification.arm.starts import Starts
 from shared.identification.dataset.resolution import steps_of
@@ -61,9 +61,15 @@ class Noise:
     is_torque: bool = False
     """Whether it is torques that the model lacks, not readings: a residual counts by what torque
     it takes, so by how hard the arm is to move."""
-    has_free_starts: bool = False
-    """Whether residuals are without what a part's first state may be off by, see
+    start_doubt: Float64 | None = None
+    """float64[2, J], standard deviations of a part's first positions (rad, m) and speeds (rad/s,
+    m/s), where residuals are without what they may be off by, see
     :mod:`shared.identification.arm.start_errors`."""
+
+    @property
+    def has_free_starts(self) -> bool:
+        """Return whether residuals are without what a part's first state may be off by."""
+        return self.start_doubt is not None
 
     @property
     def is_white(self) -> bool:
@@ -137,7 +143,10 @@ def noise_of(
         nominal: the arm; None for one that is held by its joints.
     """
     rounding = steps_of([each.q for each in dataset.trajectories]) / _ROUND
-    if nominal is not None and (answered := _answered(dataset, nominal, rounding, block)):
+    doubt = None if nominal is None else _doubt(dataset, nominal, rounding)
+    if nominal is not None and doubt is not None and (
+        answered := _answered(dataset, nominal, rounding, block, doubt)
+    ):  # fmt: skip
         return answered
     cut = None if nominal is None else CUTS.get(nominal.plant.control)
     pairs = repeat_differences(dataset, block, starts, cut)
@@ -163,7 +172,10 @@ def noise_of(
             of_tracker = np.r_[of_tracker[:3], np.repeat(2.0 * of_tracker[4:].mean(), 3)]
             tracker_correlation = tracker_correlation[:6]
         correlation = np.r_[joint_correlation, tracker_correlation]
-    found = Noise(of_joints, of_tracker, correlation, is_measured=bool(pairs))
+    found = Noise(
+        of_joints, of_tracker, correlation, is_measured=bool(pairs),
+        start_doubt=None if pairs else doubt,
+    )  # fmt: skip
     differences = [(each.joints, each.q) for each in pairs]
     pushed = None if nominal is None else pushed_of(nominal, differences, scale)
     if not pairs:
@@ -216,18 +228,32 @@ def _remembered(
     return replace(noise, memory=found)
 
 
-def _answered(dataset: Dataset, nominal: Rollouts, rounding: Float64, block: float) -> Noise | None:
-    """Return the noise beyond first states; None where commands do not answer, or parts are none.
+def _doubt(dataset: Dataset, nominal: Rollouts, rounding: Float64) -> Float64 | None:
+    """Return float64[2, J], how well first states are known where residuals are to be without them.
+
+    None where a controller holds the arm, and where repeats of the same commands say how far apart
+    parts come for having begun elsewhere.
+    """
+    if nominal.plant.control != "torque":
+        return None
+    if any(each.repeats for each in dataset.trajectories) and not answers(dataset):
+        return None
+    return states_doubt(dataset.trajectories, rounding, CUTS["torque"])
+
+
+def _answered(
+    dataset: Dataset, nominal: Rollouts, rounding: Float64, block: float, doubt: Float64
+) -> Noise | None:
+    """Return the noise beyond first states; None where nothing that is long enough repeats.
 
     Args:
         dataset: the recordings.
         nominal: the arm.
         rounding: float64[J], what an encoder's steps hide (rad, m).
         block: what residuals are averaged over (s).
+        doubt: float64[2, J], standard deviations of first states.
     """
-    if nominal.plant.control != "torque" or not answers(dataset):
-        return None
-    found = answered_noise(dataset, nominal, CUTS["torque"], block)
+    found = answered_noise(dataset, nominal, CUTS["torque"], block, doubt)
     if found is None:
         return None
     count = len(rounding)
@@ -236,7 +262,7 @@ def _answered(dataset: Dataset, nominal: Rollouts, rounding: Float64, block: flo
         tracker=found.levels[count:] if dataset.has_tracker else None,
         correlation=found.correlation,
         is_measured=True,
-        has_free_starts=True,
+        start_doubt=doubt,
     )
 
 

@@ -76,7 +76,7 @@ def astray(space: Space) -> Noise:
         space: with drives, and a noise that repeats have not measured.
     """
     problem = space.problem
-    problem = replace(problem, noise=replace(problem.noise, is_torque=True))
+    problem = replace(problem, noise=replace(problem.noise, is_torque=True, start_doubt=None))
     left = problem.plain(space.variant(by_torques(space)), problem.of("train"))
     drift = drift_of(left, 1.0, np.zeros_like(problem.noise.correlation))
     if drift is None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shared.identification.arm.start_errors import FreeStarts, across, directions
+from shared.identification.arm.start_errors import Doubt, FreeStarts
 from shared.identification.arm.subject import subject_of
 from shared.identification.fitting.parameters import base_parameters
 from shared.identification.fitting.problem import BLOCK, Problem, Variant
@@ -21,7 +21,7 @@ def problem() -> Problem:
     dataset, _ = simulated(Recipe(arm="torque2", seconds=4.0, train=2, test=1, seed=5))
     subject = subject_of(dataset)
     noise = replace(noise_of(dataset, BLOCK, subject.starts, subject.nominal), memory=None)
-    free = replace(noise, has_free_starts=True)
+    free = replace(noise, start_doubt=np.full((2, 2), 1e3))
     return Problem(subject, dataset, base_parameters(subject), free)
 
 
@@ -44,7 +44,7 @@ def elsewhere(problem: Problem, by: float) -> Problem:
 
 def test_a_first_state_that_is_off_leaves_residuals_as_they_are(problem: Problem):
     nominal, train = Variant(np.zeros(len(problem.parameters))), problem.of("train")
-    plain = replace(problem, noise=replace(problem.noise, has_free_starts=False))
+    plain = replace(problem, noise=replace(problem.noise, start_doubt=None))
     changed = [
         elsewhere(each, 0.01).vector([nominal], train) - each.vector([nominal], train)
         for each in (problem, plain)
@@ -74,13 +74,48 @@ def test_each_part_is_asked_for_once(problem: Problem, monkeypatch: pytest.Monke
     assert first[0].joints.shape[1:] == (2, 4)
 
 
-def test_directions_are_orthonormal_and_nothing_is_left_along_them():
+def test_nothing_is_left_along_what_first_states_surely_lead_to():
     rng = np.random.default_rng(0)
-    columns = rng.standard_normal((20, 3))
-    along = directions(np.c_[columns, columns[:, :1] - columns[:, 1:2]])
-    assert along.shape == (20, 3)
-    assert along.T @ along == pytest.approx(np.eye(3), abs=1e-12)
+    columns = 1e6 * rng.standard_normal((10, 2, 3))
     values = rng.standard_normal((10, 2))
-    left = across(values, along)
-    assert columns.T @ left.ravel() == pytest.approx(np.zeros(3), abs=1e-12)
-    assert across(left, along) == pytest.approx(left)
+    found = Doubt.of(np.concatenate([columns, columns[..., :1] - columns[..., 1:2]], axis=2))
+    left = found.without(values)
+    assert columns.reshape(20, 3).T @ left.ravel() / 1e6 == pytest.approx(np.zeros(3), abs=1e-4)
+    assert found.without(left) == pytest.approx(left, abs=1e-5)
+
+
+def test_noise_and_first_states_that_are_off_are_white_together():
+    rng = np.random.default_rng(1)
+    columns = rng.standard_normal((6, 2, 2)) * [0.3, 4.0]
+    found = Doubt.of(columns)
+    draws = [
+        found.without(rng.standard_normal((6, 2)) + columns @ rng.standard_normal(2)).ravel()
+        for _ in range(20_000)
+    ]
+    assert np.cov(np.array(draws).T) == pytest.approx(np.eye(12), abs=0.06)
+
+
+def test_what_is_known_of_first_states_is_kept():
+    values = np.arange(8.0).reshape(4, 2)
+    assert Doubt.of(np.zeros((4, 2, 3))).without(values) == pytest.approx(values)
+
+
+def test_blocks_that_do_not_count_have_no_say_in_it(problem: Problem):
+    nominal, segment = Variant(np.zeros(len(problem.parameters))), problem.of("test")[0]
+    pushed = replace(problem, uncounted={})
+    plain = replace(problem, noise=replace(problem.noise, start_doubt=None))
+    late = np.arange(problem.shape_of(segment)[0]) >= 9
+    logged = pushed.segments[segment]
+    at = np.minimum(np.maximum(logged.recorded.joints_at - 0.18, 0.0), 1.0)[:, None]
+    pushed.segments = tuple(
+        replace(each, q=each.q + at) if index == segment else each
+        for index, each in enumerate(pushed.segments)
+    )
+    (smeared,) = pushed.plain(nominal, [segment])
+    pushed.uncounted[segment] = late
+    (found,) = pushed.plain(nominal, [segment])
+    (own,) = plain.plain(nominal, [segment])
+    before = np.sqrt(np.mean(own[~late] ** 2))
+    assert np.sqrt(np.mean(found[~late] ** 2)) <= before
+    assert np.sqrt(np.mean(smeared[~late] ** 2)) > 3.0 * before
+    assert np.abs(found[late]).max() > np.abs(smeared).max() > 10.0

@@ -16,6 +16,8 @@ from studies.other_arms.recording import convert
 CUT = CUTS["torque"]
 ARM = replace(ARMS["three"], push=0.0, noise=1e-4)
 """Nothing pushes it: repeats differ by readings, and by what the controller makes of them."""
+STARTS = np.full((2, 3), 1.0)
+"""Nothing is known of first states."""
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +38,7 @@ def test_commands_given_twice_that_differ_answer(dataset: Dataset):
 
 
 def test_beyond_first_states_repeats_differ_as_readings_do(dataset: Dataset):
-    found = answered_noise(dataset, subject_of(dataset).nominal, CUT, 0.02)
+    found = answered_noise(dataset, subject_of(dataset).nominal, CUT, 0.02, STARTS)
     assert found is not None
     reading = ARM.noise * np.sqrt(ARM.period / 0.02)
     assert found.levels == pytest.approx(np.full(3, reading), rel=0.3)
@@ -48,4 +50,4 @@ def test_recordings_too_short_for_parts_say_nothing(dataset: Dataset):
         replace(each, joints_at=each.joints_at[:9], q=each.q[:9]) for each in dataset.trajectories
     )
     nominal = subject_of(dataset).nominal
-    assert answered_noise(replace(dataset, trajectories=short), nominal, CUT, 0.02) is None
+    assert answered_noise(replace(dataset, trajectories=short), nominal, CUT, 0.02, STARTS) is None
