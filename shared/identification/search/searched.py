@@ -208,11 +208,12 @@ class Search:
 
     @property
     def base_parts(self) -> Fit:
-        """Return the base's fit on short parts, of a search that has just begun.
+        """Return the base's fit on short parts, or on whole recordings once causes are in those.
 
-        Causes are there from the begin only under torque control, where all parts are short.
+        They are there from the begin only under torque control, where all parts are short; and
+        they stay there when all that was accepted is taken back.
         """
-        return self.base if self.accepted else self.parts
+        return self.base if self.parts.space.candidates else self.parts
 
     @property
     def left(self) -> Left:

@@ -9,14 +9,16 @@ import pytest
 
 from shared.identification.catalogue.viscous_friction import EFFECT as VISCOUS
 from shared.identification.dataset.types import Dataset
-from shared.identification.fitting.saved import FILE, SCHEMA, load, save
+from shared.identification.fitting.fit import Fit
+from shared.identification.fitting.saved import FILE, SCHEMA, fits_of, load, save
+from shared.identification.fitting.space import Space
 from shared.identification.progress import silent
 from shared.identification.search.begin import begin
 from shared.identification.search.rounds import search
 from shared.identification.search.searched import Search
 from shared.sim.plant.row import Row
 from tests.measured import measure
-from tests.searches import Searches
+from tests.searches import ELBOW, Searches
 
 _ODD_BYTES = (b"", b"{", b"null", b"[1, 2]", b"\xff\xfe", b'{"dataset": "\xff"}')
 
@@ -41,6 +43,16 @@ def test_other_data_another_seed_or_another_model_have_no_base_fit(tmp_path: Pat
     assert load(tmp_path, kept, 8) is None
     assert load(tmp_path, replace(kept, source=replace(kept.source, tracked="")), 7) is None
     assert load(tmp_path / "nowhere", kept, 7) is None
+
+
+def test_a_search_that_took_all_back_is_kept_by_its_base(tmp_path: Path):
+    searches = Searches(tmp_path)
+    found = searches.search(np.ones(4))
+    with_cause = Space(searches.parts.space.problem, (ELBOW,))
+    begun = np.r_[searches.base.z, 0.5]
+    found.parts = Fit.at(with_cause, begun, with_cause.problem.of("train"))
+    fits = fits_of(found)
+    assert len(fits.names) == len(fits.parts) == len(fits.whole) == 18
 
 
 def test_another_schema_or_a_number_too_few_is_no_base_fit(tmp_path: Path, kept: Dataset):
