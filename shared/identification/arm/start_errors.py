@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shared.identification.dataset.types import Float64
 from shared.sim.plant.replay import Recorded
@@ -89,6 +90,8 @@ def start_errors(arms: Rollouts, parts: Sequence[Recorded], entry: Entry) -> lis
 class Doubt:
     """What there is in residuals of one part that its first state could be."""
 
+    columns: Float64
+    """float64[..., K], standard deviations of each number for each that a state is off by."""
     along: Float64
     """float64[N, K], orthonormal, of N numbers."""
     kept: Float64
@@ -96,16 +99,25 @@ class Doubt:
 
     @classmethod
     def of(cls, columns: Float64) -> "Doubt":
-        """Return it of columns float64[..., K], standard deviations of each number by its noise."""
+        """Return it of float64[..., K], how far each number is off by first states, in floors."""
         along, sizes, _ = np.linalg.svd(columns.reshape(-1, columns.shape[-1]), full_matrices=False)
-        return cls(along, 1.0 / np.hypot(1.0, sizes))
+        return cls(columns, along, 1.0 / np.hypot(1.0, sizes))
 
-    def without(self, values: Float64) -> Float64:
+    def without(self, values: Float64, uncounted: NDArray[np.bool_] | None = None) -> Float64:
         """Return N values as they would be of noise alone: white if they are no more than that.
 
         Their covariance is 1 and, along each direction, the square of how far first states lead
         there: by the root of its inverse.
+
+        Args:
+            values: float64[B, C].
+            uncounted: bool[B], rows that have no say in it, and stay as they are.
         """
+        if uncounted is not None and uncounted.any():
+            out, counted = values.copy(), ~uncounted
+            if counted.any():
+                out[counted] = Doubt.of(self.columns[counted]).without(values[counted])
+            return out
         flat = values.ravel()
         less = self.along @ ((1.0 - self.kept) * (self.along.T @ flat))
         return np.asarray((flat - less).reshape(values.shape), np.float64)

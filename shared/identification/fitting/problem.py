@@ -87,17 +87,14 @@ class Problem:
     """Compiled, by what effects have added and by time step."""
     _bins: dict[int, tuple[Bins, Bins | None]] = field(init=False)
     _whitening: dict[int, Float64 | None] = field(init=False)
-    _starts: dict[int, Float64] = field(init=False)
-    """float64[B, C, K] by segment, noise floors that first states are off by; where that counts."""
     _doubts: dict[int, Doubt] = field(init=False)
-    """The same as it is taken off residuals, all blocks of which count."""
+    """What residuals have in them of first states, by segment; where that is taken off."""
 
     def __post_init__(self) -> None:
         self.segments = segments_of(self.dataset, self.subject, self.window)
         self._arms.setdefault(((), self.subject.plant.timestep), self.subject.nominal)
         self._bins = {}
         self._whitening = {}
-        self._starts = {}
         self._doubts = {}
         if not self.noise.has_free_starts:
             self.free_starts = None
@@ -361,30 +358,17 @@ class Problem:
         if tracker is not None and of_tracker is not None and self.noise.tracker is not None:
             out = beside(out, of_tracker.mean(tracker) / self.noise.tracker)
         out = np.nan_to_num(out, nan=DIVERGED, posinf=DIVERGED, neginf=-DIVERGED)
-        return self._beyond_starts(out, segment) if segment in self._starts else out
-
-    def _beyond_starts(self, out: Float64, segment: int) -> Float64:
-        """Return residuals without what a part's first state may be off by.
-
-        Blocks that no loss counts have no say in that, and stay as they are.
-        """
-        uncounted = self.uncounted.get(segment)
-        if uncounted is None or not uncounted.any():
-            return self._doubts[segment].without(out)
-        if not uncounted.all():
-            columns = self._starts[segment][~uncounted]
-            out[~uncounted] = Doubt.of(columns).without(out[~uncounted])
-        return out
+        doubt = self._doubts.get(segment)
+        return out if doubt is None else doubt.without(out, self.uncounted.get(segment))
 
     def _free_starts(self, segments: Sequence[int]) -> None:
         """See to it that it is known of segments what they are off by where they begin."""
         if self.free_starts is None:
             return
-        new = [each for each in segments if each not in self._starts]
+        new = [each for each in segments if each not in self._doubts]
         errors = self.free_starts.of([self.segments[each].recorded for each in new])
         for segment, error in zip(new, errors, strict=True):
-            columns = self._in_floors_of(error, segment)
-            self._starts[segment], self._doubts[segment] = columns, Doubt.of(columns)
+            self._doubts[segment] = Doubt.of(self._in_floors_of(error, segment))
 
     def _in_floors_of(self, error: StartErrors, segment: int) -> Float64:
         """Return float64[B, C, K]: what starts are off by, in floors as residuals are."""

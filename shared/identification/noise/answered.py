@@ -27,6 +27,7 @@ _SAME = 1e-3
 _TINY = 1e-12
 """Less than any noise (rad, m)."""
 _ROUNDS = 4
+"""Times that it is asked what is noise and what a first state: each depends on the other."""
 _LOUD = 4.0
 """Times the usual power, from which a part has no more of a say than that."""
 
@@ -73,7 +74,7 @@ def answered_noise(
         return None
     level = np.full(found[0][0].shape[1], _TINY)
     left: list[Float64] = []
-    for _ in range(_ROUNDS):  # what is noise and what a first state depends on either
+    for _ in range(_ROUNDS):
         unit = level[:, None]
         left = [
             level * Doubt.of(columns * starts.ravel() / unit).without(off / level)

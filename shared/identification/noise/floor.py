@@ -144,10 +144,10 @@ def noise_of(
     """
     rounding = steps_of([each.q for each in dataset.trajectories]) / _ROUND
     doubt = None if nominal is None else _doubt(dataset, nominal, rounding)
-    if nominal is not None and doubt is not None and (
-        answered := _answered(dataset, nominal, rounding, block, doubt)
-    ):  # fmt: skip
-        return answered
+    if nominal is not None and doubt is not None:
+        answered = _answered(dataset, nominal, rounding, block, doubt)
+        if answered is not None:
+            return answered
     cut = None if nominal is None else CUTS.get(nominal.plant.control)
     pairs = repeat_differences(dataset, block, starts, cut)
     joints = [each.joints for each in pairs]
