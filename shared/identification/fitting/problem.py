@@ -1,7 +1,6 @@
 """Variants of the model against the recordings: residuals in units of the noise floor."""
 
 import copy
-import functools
 import math
 from collections import defaultdict
 from collections.abc import Sequence
@@ -16,10 +15,10 @@ from shared.identification.arm.start_errors import Doubt, FreeStarts, StartError
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Dataset, Float64
 from shared.identification.effect import Candidate
+from shared.identification.fitting.lacking import Lacking
 from shared.identification.fitting.parameters import BaseParameter, enter_base
 from shared.identification.noise.blocks import Bins, beside
 from shared.identification.noise.floor import Noise
-from shared.sim.plant.inverse import model_of, reluctance
 from shared.sim.plant.plant import stepped
 from shared.sim.plant.replay import Reports
 from shared.sim.plant.rollouts import Entry, Rollouts, as_it_is
@@ -29,12 +28,8 @@ from shared.sim.plant.structure import Structure
 
 BLOCK = 0.02
 """Residuals are averaged over this long: what a 50 Hz look at the arm would see (s)."""
-_POSTURES = 8
-"""Of all recordings together, at which it is asked how hard the arm is to move."""
 _WITH_MORE = 64
 """Arms at once, of those with what an effect compiles into them."""
-_SHORT = 0.15
-"""For which a torque moves it then: half of a part (s)."""
 DIVERGED = 1e3
 """Residual of an arm whose physics diverged, in noise floors."""
 
@@ -87,11 +82,13 @@ class Problem:
     """Compiled, by what effects have added and by time step."""
     _bins: dict[int, tuple[Bins, Bins | None]] = field(init=False)
     _whitening: dict[int, Float64 | None] = field(init=False)
+    _lacking: Lacking = field(init=False)
     _doubts: dict[int, Doubt] = field(init=False)
     """What residuals have in them of first states, by segment; where that is taken off."""
 
     def __post_init__(self) -> None:
         self.segments = segments_of(self.dataset, self.subject, self.window)
+        self._lacking = Lacking.of(self.subject, self.dataset)
         self._arms.setdefault(((), self.subject.plant.timestep), self.subject.nominal)
         self._bins = {}
         self._whitening = {}
@@ -222,15 +219,8 @@ class Problem:
         ``BLOCK``; C are the joints, then position and rotation of the tracker.
         """
         return [
-            [
-                self.noise.news(self.floors(report, segment, weight))
-                for report, segment in zip(reports, segments, strict=True)
-            ]
-            for weight, reports in zip(
-                map(self._weight, variants),
-                self.reports(variants, segments, timestep),
-                strict=True,
-            )
+            [self.noise.news(each) for each in parts]
+            for parts in self._plain(variants, segments, timestep)
         ]
 
     def shape_of(self, segment: int) -> tuple[int, int]:
@@ -257,45 +247,34 @@ class Problem:
 
         What is slow counts for as much there as what is fast.
         """
-        (reports,) = self.reports([variant], segments)
-        weight = self._weight(variant)
+        return self._plain([variant], segments)[0]
+
+    def _plain(
+        self, variants: Sequence[Variant], segments: Sequence[int], timestep: float | None = None
+    ) -> list[list[Float64]]:
+        if (floor := self.noise.torque) is not None:
+            return [[one / floor for one in self._lacks(each, segments)] for each in variants]
         return [
-            self.floors(each, segment, weight)
-            for each, segment in zip(reports, segments, strict=True)
+            [
+                self.floors(report, segment)
+                for report, segment in zip(reports, segments, strict=True)
+            ]
+            for reports in self.reports(variants, segments, timestep)
         ]
 
-    def _weight(self, variant: Variant) -> Float64:
-        """Return float64[J], how hard a variant is to move, in times what the nominal arm is.
-
-        What an arm goes astray by is the torque that the model lacks, over how hard it is to move.
-        Without that, the heavier an arm the better it fits: one that nothing moves goes on as it
-        began. Ones where noise is no torque.
-        """
-        if not self.noise.is_torque:
-            return np.ones(len(self.noise.joints))
-        return self._reluctance(variant) / self._nominal_reluctance
-
-    @functools.cached_property
-    def _nominal_reluctance(self) -> Float64:
-        return self._reluctance(Variant(np.zeros(len(self.parameters))))
-
-    def _reluctance(self, variant: Variant) -> Float64:
-        """Return float64[J], how hard joints are to move, at some postures of the recordings.
-
-        Without what an effect compiles into the arm.
-        """
-        subject = self.subject
-        extras = tuple(
-            each for each in variant.extras if not each[0].effect.structure(subject, each[0].place)
-        )
-        entry = self.entry(Variant(variant.x, extras))
-        row = subject.nominal.entered(entry, self.segments[0].recorded)
-        return reluctance(subject.plant, model_of(row), self._postures, _SHORT).mean(axis=0)
-
-    @functools.cached_property
-    def _postures(self) -> Float64:
-        q = np.concatenate([each.q for each in self.dataset.trajectories])
-        return q[:: max(len(q) // _POSTURES, 1)]
+    def _lacks(self, variant: Variant, segments: Sequence[int]) -> list[Float64]:
+        """Return float64[B, J] by segment: block means of torques that are missing (N m, N)."""
+        entry = self.entry(variant)
+        recordings = {self.segments[each].trajectory for each in segments}
+        missing = {each: self._lacking.torque(entry, each) for each in recordings}
+        out: list[Float64] = []
+        for index in segments:
+            segment = self.segments[index]
+            at = self.dataset.trajectories[segment.trajectory].joints_at
+            first = int(np.searchsorted(at, segment.recorded.begin))
+            own = missing[segment.trajectory][first : first + len(segment.q)]
+            out.append(self._bins[index][0].mean(own))
+        return out
 
     def vector(
         self, variants: Sequence[Variant], segments: Sequence[int], timestep: float | None = None
@@ -342,19 +321,16 @@ class Problem:
         """Return block means of a segment's joint residuals, float64[B, J], in noise floors."""
         return self.noise.floors(joints, self._whitening[segment])
 
-    def floors(self, reports: Reports, segment: int, weight: Float64 | None = None) -> Float64:
+    def floors(self, reports: Reports, segment: int) -> Float64:
         """Return float64[B, C]: block means of a segment's residuals in noise floors.
 
         Args:
             reports: what a variant would have logged.
             segment: of which part.
-            weight: float64[J], what residuals of the joints are multiplied by.
         """
         joints, tracker = self.raw(reports, segment)
         of_joints, of_tracker = self._bins[segment]
         out = self.in_floors(of_joints.mean(joints), segment)
-        if weight is not None:
-            out = weight * out
         if tracker is not None and of_tracker is not None and self.noise.tracker is not None:
             out = beside(out, of_tracker.mean(tracker) / self.noise.tracker)
         out = np.nan_to_num(out, nan=DIVERGED, posinf=DIVERGED, neginf=-DIVERGED)

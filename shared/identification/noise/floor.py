@@ -58,9 +58,9 @@ class Noise:
     memory: Memory | Drift | None = None
     """How much of it is carried on from block to block, or how it grows where nothing holds the
     arm; None where no repeat says so, and nothing else does."""
-    is_torque: bool = False
-    """Whether it is torques that the model lacks, not readings: a residual counts by what torque
-    it takes, so by how hard the arm is to move."""
+    torque: Float64 | None = None
+    """float64[J], of the torques that joints lack (N m, N), where residuals are these and not what
+    was read, see :mod:`shared.identification.fitting.lacking`."""
     start_doubt: Float64 | None = None
     """float64[2, J], standard deviations of a part's first positions (rad, m) and speeds (rad/s,
     m/s), where residuals are without what they may be off by, see
@@ -70,6 +70,11 @@ class Noise:
     def has_free_starts(self) -> bool:
         """Return whether residuals are without what a part's first state may be off by."""
         return self.start_doubt is not None
+
+    @property
+    def is_torque(self) -> bool:
+        """Return whether residuals are torques that the model lacks, not readings."""
+        return self.torque is not None
 
     @property
     def is_white(self) -> bool:

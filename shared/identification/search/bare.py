@@ -22,7 +22,6 @@ from shared.identification.fitting.space import Space
 from shared.identification.fitting.torques import by_torques
 from shared.identification.gate.certainty import is_there
 from shared.identification.gate.held_out import compare, stretches
-from shared.identification.noise.drift import drift_of
 from shared.identification.noise.floor import Noise
 from shared.identification.search.family import Family, left_without
 from shared.identification.search.screen import Screened
@@ -42,6 +41,8 @@ _MOST = 0.5
 """Share of the joints at which an effect has to be."""
 _STEPS = 6
 """Derivatives of a fit."""
+_LEAST_TORQUE = 1e-9
+"""That is told from none (N m, N)."""
 
 
 def lacking(space: Space, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
@@ -69,28 +70,31 @@ def astray(space: Space) -> Noise:
     """Return noise as of an arm that is pushed at random by torques, as far as drives leave it.
 
     Sensors beyond the gears see an arm so light that a torque that is off by a hundredth leads it
-    far astray: the heavier the better it fits then, and the end of a part outweighs all before.
-    Here a residual counts by the torque that it takes, and only what is new in each block.
+    far astray: the heavier, or the more it rubs, the better it fits then. Here residuals are the
+    torques that are missing.
 
     Args:
         space: with drives, and a noise that repeats have not measured.
     """
-    problem = space.problem
-    problem = replace(problem, noise=replace(problem.noise, is_torque=True, start_doubt=None))
+    noise, joints = space.problem.noise, len(space.problem.noise.joints)
+    noise = replace(
+        noise, tracker=None, correlation=noise.correlation[:joints], start_doubt=None,
+        torque=np.ones(joints),
+    )  # fmt: skip
+    problem = replace(space.problem, noise=noise)
     left = problem.plain(space.variant(by_torques(space)), problem.of("train"))
-    drift = drift_of(left, 1.0, np.zeros_like(problem.noise.correlation))
-    if drift is None:
-        return problem.noise
-    return problem.noise.growing(drift, max(len(each) for each in left))
+    size = np.maximum(np.sqrt(np.mean(np.concatenate(left) ** 2, axis=0)), _LEAST_TORQUE)
+    return replace(noise, torque=size, memory=None)
 
 
 def counted_by_torque(noise: Noise) -> str:
-    """Return in words that residuals count as :func:`astray` says; empty where they do not."""
+    """Return in words that residuals are what :func:`astray` says; empty where they are not."""
     if not noise.is_torque:
         return ""
     return (
         "the arm is so light, as its torques were measured, that it goes astray in a moment: how "
-        "far off a model is was judged by the torque that is missing, while pictures show angles"
+        "far off a model is was judged by the torques that its motion takes and did not get, which "
+        "show no wrong reading and nothing that gives; pictures show angles"
     )
 
 
@@ -137,14 +141,18 @@ def with_drives(
         other = _fitted(Space(problem, (*together.space.candidates, *pushed)), train)
         if other.cost < together.cost - _MUCH_BETTER:
             together, kept = other, _needed(other, test, rng)
-    if not set(kept) & set(lacks):
+    if not (set(kept) & set(lacks) or problem.noise.is_torque):
         return None  # what the tool carries, or pushes, is found like any other cause
     is_whole = len(kept) == len(together.space.candidates)
     fit = together if is_whole else _fitted(Space(problem, kept), train)
+    fit = _with_kinds(fit, together, lacks, rng)
+    if not set(fit.space.candidates) & set(lacks):
+        return None
     after = stretches(problem, fit.variant, test)
     if not compare(before, after, rng).is_sure:
         return None
-    gains = {each: compare(left_without(fit, each, test), after, rng) for each in kept}
+    own = fit.space.candidates
+    gains = {each: compare(left_without(fit, each, test), after, rng) for each in own}
     return Family(fit, after, gains)
 
 
@@ -162,6 +170,56 @@ def screened_of(fit: Fit, candidate: Candidate) -> Screened:
 
 def _fitted(space: Space, train: tuple[int, ...]) -> Fit:
     return polish(space, by_torques(space), train, _STEPS)
+
+
+def _with_kinds(
+    fit: Fit, together: Fit, lacks: Sequence[Candidate], rng: np.random.Generator
+) -> Fit:
+    """Return a fit with whole kinds of what drives may have, where held-out motion needs them.
+
+    Of little motion friction of either kind and rotors say much the same: none is sure beside the
+    others, and without any of them all that they do is left.
+
+    Args:
+        fit: with what is surely needed.
+        together: with all there may be.
+        lacks: that, but for loads and pushes.
+        rng: draws.
+    """
+    problem = fit.space.problem
+    train, test = problem.of("train"), problem.of("test")
+    losses = stretches(problem, fit.variant, test)
+    if not compare(losses, stretches(problem, together.variant, test), rng).is_sure:
+        return fit
+    while left := [each for each in lacks if each not in fit.space.candidates]:
+        kinds = [list(group) for _, group in groupby(left, lambda each: each.effect.name)]
+        more = [
+            _fitted(_space_of(together, (*fit.space.candidates, *kind)), train) for kind in kinds
+        ]
+        best = _that_are_there(min(more, key=lambda each: each.cost), rng)
+        after = stretches(problem, best.variant, test)
+        if not compare(losses, after, rng).is_sure:
+            break
+        fit, losses = best, after
+    return fit
+
+
+def _that_are_there(fit: Fit, rng: np.random.Generator) -> Fit:
+    """Return a fit without causes that may be nothing, unless held-out motion needs them."""
+    problem = fit.space.problem
+    train, test = problem.of("train"), problem.of("test")
+    there = tuple(each for each in fit.space.candidates if is_there(fit, each, train))
+    if len(there) == len(fit.space.candidates):
+        return fit
+    fewer = _fitted(Space(problem, there), train)
+    before, after = (stretches(problem, each.variant, test) for each in (fewer, fit))
+    return fit if compare(before, after, rng).is_sure else fewer
+
+
+def _space_of(together: Fit, chosen: Sequence[Candidate]) -> Space:
+    """Return where some of all causes are fitted, in their order."""
+    own = tuple(each for each in together.space.candidates if each in chosen)
+    return Space(together.space.problem, own)
 
 
 def _needed(fit: Fit, test: tuple[int, ...], rng: np.random.Generator) -> tuple[Candidate, ...]:

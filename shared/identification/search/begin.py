@@ -18,6 +18,7 @@ from shared.identification.fitting.base import (
     with_starts,
 )
 from shared.identification.fitting.fit import Fit
+from shared.identification.fitting.lacking import shows
 from shared.identification.fitting.parameters import BaseParameter, base_parameters, bends
 from shared.identification.fitting.problem import BLOCK, Problem, Span
 from shared.identification.fitting.shown import if_shown, with_shown
@@ -100,8 +101,13 @@ def begin(
         progress("base fit", 0.5, "as an arm that torques push which nobody knows")
         by_torque = replace(problem, noise=astray(Space(full, lacks)))
         other, found = step.from_base(by_torque, rng)
-        done, family = (done, family) if done and found is None else (other, found)
+        # Where drives show in neither, links tell: torques that nobody knows bend them in one.
+        is_bent = done is not None and _released_in(done) < _released_in(other)
+        if done is None or found is not None or is_bent:
+            done, family = other, found
     problem = done.whole.space.problem
+    if problem.noise.is_torque:
+        candidates = _shown_by_torques(problem, candidates, ruled_out)
     return begun_with(
         done,
         family,
@@ -110,6 +116,24 @@ def begin(
         ruled_out=ruled_out,
         doubted=tuple(each.name for each in released if each not in problem.parameters),
     )
+
+
+def _released_in(fits: BaseFits) -> int:
+    """Return how many numbers a base has: those that it bent beyond belief are not released."""
+    return len(fits.whole.space.problem.parameters)
+
+
+def _shown_by_torques(
+    problem: Problem, candidates: tuple[Candidate, ...], ruled_out: dict[str, str]
+) -> tuple[Candidate, ...]:
+    """Return what missing torques tell of, and note what they do not."""
+    recorded = problem.segments[0].recorded
+    kept = tuple(each for each in candidates if shows(problem.subject, each, recorded))
+    names = {each.effect.name for each in kept}
+    for each in candidates:
+        if each.effect.name not in names:
+            ruled_out[each.effect.name] = "the torques that a motion takes do not show it"
+    return kept
 
 
 @dataclass(frozen=True)

@@ -55,26 +55,6 @@ def inverse_dynamics(
     return out
 
 
-def reluctance(plant: Plant, model: mujoco.MjModel, q: Float64, time: float) -> Float64:
-    """Return float64[T, J]: torque by which each joint has moved by 1 after a time (N m/rad, N/m).
-
-    By what it has to turn and by its damper: M / time^2 + D / time.
-
-    Args:
-        plant: the arm.
-        model: of it, compiled.
-        q: float64[T, J], of the logged joints (rad, m).
-        time: for which it acts (s).
-    """
-    still = np.zeros_like(q)
-    dofs = np.array([int(model.joint(name).dofadr[0]) for name in plant.joints])
-    out, whole = np.empty_like(q), np.empty((model.nv, model.nv))
-    for index, data in enumerate(_inverted(plant, model, q, still, still)):
-        mujoco.mj_fullM(model, data, whole)
-        out[index] = whole.diagonal()[dofs] / time**2 + model.dof_damping[dofs] / time
-    return out
-
-
 def held_still(
     plant: Plant, model: mujoco.MjModel, names: Sequence[str], q: Float64, qd: Float64, qdd: Float64
 ) -> tuple[Float64, Float64]:

@@ -10,6 +10,7 @@ from shared.identification.fitting.fit import Fit
 from shared.identification.fitting.problem import Problem
 from shared.identification.fitting.space import Space
 from shared.identification.fitting.torques import by_torques
+from shared.identification.search import bare
 from shared.identification.search.bare import (
     astray,
     counted_by_torque,
@@ -21,7 +22,7 @@ from shared.identification.search.bare import (
     with_drives,
 )
 from tests.arms import JOINTS, make_plant, make_subject
-from tests.geared import FRICTION, candidates, problem_of_geared
+from tests.geared import FRICTION, SENSED, candidates, problem_of_geared
 
 DRIVES = ("coulomb_friction", "viscous_friction", "rotor_inertia")
 
@@ -111,14 +112,31 @@ def test_nothing_is_lacking_where_the_file_has_it_or_a_servo_holds_the_arm(tmp_p
     assert with_drives(_base(problem), (), np.random.default_rng(0)) is None
 
 
-def test_where_torques_push_an_arm_that_nobody_knows_a_heavier_one_is_further_off(tmp_path: Path):
+def test_kinds_without_which_all_is_left_come_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    problem = problem_of_geared(tmp_path, is_bare=True)
+    base = _base(problem)
+    lacks = lacking(base.space, candidates(problem, *DRIVES))
+    viscous = tuple(each for each in lacks if each.effect.name == "viscous_friction")
+    monkeypatch.setattr(bare, "_needed", lambda *_: viscous)  # as of motion that tells little
+    found = with_drives(base, lacks, np.random.default_rng(0))
+    assert found is not None
+    assert {each.effect.name for each in found.gains} == set(DRIVES)
+    sizes = dict(zip(found.fit.space.candidates, found.fit.space.values(found.fit.z), strict=True))
+    rubs = {each.place: sizes[each][0] for each in lacks if each.effect.name == "coulomb_friction"}
+    assert rubs == pytest.approx(FRICTION, rel=0.1)
+
+
+def test_where_torques_push_an_arm_that_nobody_knows_neither_weight_nor_friction_hides_them(
+    tmp_path: Path,
+):
     problem = problem_of_geared(tmp_path, is_sensed=True)
     space = Space(problem, candidates(problem, "coulomb_friction"))
     light = by_torques(space)
-    heavy = light.copy()
+    heavy, stuck = light.copy(), light.copy()
     for index, parameter in enumerate(problem.parameters):
         if parameter.name.startswith("armature"):
             heavy[index] = np.log(0.3 / parameter.nominal)  # where an arm goes on as it began
+    stuck[space.base_size :] *= 20.0
     noise = astray(space)
     pushed = Space(replace(problem, noise=noise), space.candidates)
     train = problem.of("train")
@@ -127,7 +145,11 @@ def test_where_torques_push_an_arm_that_nobody_knows_a_heavier_one_is_further_of
         return float(np.mean(space.problem.vector([space.variant(z)], train) ** 2))
 
     assert noise.is_torque
+    assert noise.torque is not None
     assert "torque" in counted_by_torque(noise)
     assert counted_by_torque(problem.noise) == ""
-    worse = left(space, heavy) / left(space, light)
-    assert left(pushed, heavy) / left(pushed, light) > 3.0 * worse
+    for wrong in (heavy, stuck):
+        worse = left(space, wrong) / left(space, light)
+        assert left(pushed, wrong) / left(pushed, light) > 3.0 * worse
+    sizes = [values[0] for values in pushed.values(light)]
+    assert sizes == pytest.approx([SENSED * FRICTION[joint] for joint in JOINTS], rel=0.3)
