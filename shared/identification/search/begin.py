@@ -102,7 +102,7 @@ def begin(
         by_torque = replace(problem, noise=astray(Space(full, lacks)))
         other, found = step.from_base(by_torque, rng)
         # Where drives show in neither, links tell: torques that nobody knows bend them in one.
-        is_bent = done is not None and _released_in(done) < _released_in(other)
+        is_bent = done is not None and _held_of(done, released) > _held_of(other, released)
         if done is None or found is not None or is_bent:
             done, family = other, found
     problem = done.whole.space.problem
@@ -118,9 +118,9 @@ def begin(
     )
 
 
-def _released_in(fits: BaseFits) -> int:
-    """Return how many numbers a base has: those that it bent beyond belief are not released."""
-    return len(fits.whole.space.problem.parameters)
+def _held_of(fits: BaseFits, released: tuple[BaseParameter, ...]) -> int:
+    """Return how many numbers a base bent beyond belief, so that they are held."""
+    return sum(each not in fits.whole.space.problem.parameters for each in released)
 
 
 def _shown_by_torques(
