@@ -31,6 +31,9 @@ def misstated(
 ) -> Search | None:
     """Return a search that names what the model file has wrong at a joint or two, if one does.
 
+    Or one that explains all by other causes with those numbers as the file has them, if nothing
+    else does: a base that is free to be wrong there may hide a cause.
+
     Args:
         found: a search, over.
         untouched: the same as it began.
@@ -56,7 +59,8 @@ def misstated(
     search(other, progress)
     clear(other, progress)
     named = {each.candidate for each in other.accepted}
-    if not named.issuperset(wrong.values()) or is_open(other):
+    is_told = named.issuperset(wrong.values())
+    if is_open(other) or not named or not (is_told or is_open(found)):
         return None
     return None if is_worse(other.current_losses, found.current_losses) else other
 
