@@ -234,8 +234,6 @@ def _may_be_its_step(found: Search) -> bool:
 
 def _pushed_once(found: Search, left: tuple[Unexplained, ...]) -> tuple[Unexplained, ...]:
     """Name what pushed once, if no law is missing; return what is left after that."""
-    if found.problem.noise.is_torque:
-        return left  # all that is left is taken for torques that nobody knows
     if take_back_pushes(found, left):
         left = _left(found, _pushes(left))
     if is_open(found) or not take_pushes(found, left):

@@ -6,7 +6,7 @@ say at each instant what is missing (Atkeson, An and Hollerbach 1986), whatever 
 show nothing of where readings are wrong, nor of what gives between a drive and its link.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -33,12 +33,9 @@ class Lacking:
 
     subject: Subject
     dataset: Dataset
-    _known: dict[int, tuple[Recorded, Motion]]
-
-    @staticmethod
-    def of(subject: Subject, dataset: Dataset) -> "Lacking":
-        """Return that of an arm's recordings."""
-        return Lacking(subject, dataset, {})
+    _known: dict[int, tuple[Recorded, Motion]] = field(
+        default_factory=dict[int, tuple[Recorded, Motion]], repr=False
+    )
 
     def torque(self, entry: Entry, trajectory: int) -> Float64:
         """Return float64[T, J]: what was missing at each reading (N m, N).
@@ -53,9 +50,7 @@ class Lacking:
         row = self.subject.nominal.entered(entry, recorded)
         at = recorded.joints_at
         command = smooth_motion(at, row.command.held(at)).q
-        missing = missing_beside_laws(
-            row, motion.at - recorded.begin, motion.q, motion.qd, motion.qdd, command
-        )
+        missing = missing_beside_laws(row, motion.at, motion.q, motion.qd, motion.qdd, command)
         return sampled(motion.at, missing, at)
 
     def _of(self, trajectory: int) -> tuple[Recorded, Motion]:

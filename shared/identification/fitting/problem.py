@@ -88,7 +88,7 @@ class Problem:
 
     def __post_init__(self) -> None:
         self.segments = segments_of(self.dataset, self.subject, self.window)
-        self._lacking = Lacking.of(self.subject, self.dataset)
+        self._lacking = Lacking(self.subject, self.dataset)
         self._arms.setdefault(((), self.subject.plant.timestep), self.subject.nominal)
         self._bins = {}
         self._whitening = {}

@@ -79,12 +79,12 @@ def astray(space: Space) -> Noise:
     noise, joints = space.problem.noise, len(space.problem.noise.joints)
     noise = replace(
         noise, tracker=None, correlation=noise.correlation[:joints], start_doubt=None,
-        torque=np.ones(joints),
+        memory=None, torque=np.ones(joints),
     )  # fmt: skip
     problem = replace(space.problem, noise=noise)
     left = problem.plain(space.variant(by_torques(space)), problem.of("train"))
     size = np.maximum(np.sqrt(np.mean(np.concatenate(left) ** 2, axis=0)), _LEAST_TORQUE)
-    return replace(noise, torque=size, memory=None)
+    return replace(noise, torque=size)
 
 
 def counted_by_torque(noise: Noise) -> str:
@@ -145,10 +145,9 @@ def with_drives(
         return None  # what the tool carries, or pushes, is found like any other cause
     is_whole = len(kept) == len(together.space.candidates)
     fit = together if is_whole else _fitted(Space(problem, kept), train)
-    fit = _with_kinds(fit, together, lacks, rng)
+    fit, after = _with_kinds(fit, together, lacks, rng)
     if not set(fit.space.candidates) & set(lacks):
         return None
-    after = stretches(problem, fit.variant, test)
     if not compare(before, after, rng).is_sure:
         return None
     own = fit.space.candidates
@@ -174,11 +173,12 @@ def _fitted(space: Space, train: tuple[int, ...]) -> Fit:
 
 def _with_kinds(
     fit: Fit, together: Fit, lacks: Sequence[Candidate], rng: np.random.Generator
-) -> Fit:
+) -> tuple[Fit, Float64]:
     """Return a fit with whole kinds of what drives may have, where held-out motion needs them.
 
-    Of little motion friction of either kind and rotors say much the same: none is sure beside the
-    others, and without any of them all that they do is left.
+    And float64[S], what it leaves of held-out stretches. Of little motion friction of either kind
+    and rotors say much the same: none is sure beside the others, and without any of them all that
+    they do is left.
 
     Args:
         fit: with what is surely needed.
@@ -190,30 +190,33 @@ def _with_kinds(
     train, test = problem.of("train"), problem.of("test")
     losses = stretches(problem, fit.variant, test)
     if not compare(losses, stretches(problem, together.variant, test), rng).is_sure:
-        return fit
+        return fit, losses
     while left := [each for each in lacks if each not in fit.space.candidates]:
         kinds = [list(group) for _, group in groupby(left, lambda each: each.effect.name)]
         more = [
             _fitted(_space_of(together, (*fit.space.candidates, *kind)), train) for kind in kinds
         ]
-        best = _that_are_there(min(more, key=lambda each: each.cost), rng)
-        after = stretches(problem, best.variant, test)
+        best, after = _that_are_there(min(more, key=lambda each: each.cost), rng)
         if not compare(losses, after, rng).is_sure:
             break
         fit, losses = best, after
-    return fit
+    return fit, losses
 
 
-def _that_are_there(fit: Fit, rng: np.random.Generator) -> Fit:
-    """Return a fit without causes that may be nothing, unless held-out motion needs them."""
+def _that_are_there(fit: Fit, rng: np.random.Generator) -> tuple[Fit, Float64]:
+    """Return a fit without causes that may be nothing, unless held-out motion needs them.
+
+    And float64[S], what it leaves of held-out stretches.
+    """
     problem = fit.space.problem
     train, test = problem.of("train"), problem.of("test")
+    losses = stretches(problem, fit.variant, test)
     there = tuple(each for each in fit.space.candidates if is_there(fit, each, train))
     if len(there) == len(fit.space.candidates):
-        return fit
+        return fit, losses
     fewer = _fitted(Space(problem, there), train)
-    before, after = (stretches(problem, each.variant, test) for each in (fewer, fit))
-    return fit if compare(before, after, rng).is_sure else fewer
+    without = stretches(problem, fewer.variant, test)
+    return (fit, losses) if compare(without, losses, rng).is_sure else (fewer, without)
 
 
 def _space_of(together: Fit, chosen: Sequence[Candidate]) -> Space:

@@ -98,25 +98,6 @@ def _inverted(
         yield data
 
 
-def missing_torques(
-    plant: Plant, model: mujoco.MjModel, q: Float64, qd: Float64, qdd: Float64, command: Float64
-) -> Float64:
-    """Return float64[T, J]: what a motion takes beyond what the drives would give (N m, N).
-
-    What an extra torque at a joint looks like, without simulating anything.
-
-    Args:
-        plant: the arm; its actuators have no state of their own.
-        model: of it, compiled.
-        q: float64[T, J] (rad, m).
-        qd: float64[T, J] (rad/s, m/s).
-        qdd: float64[T, J] (rad/s^2, m/s^2).
-        command: float64[T, U], in force at each instant.
-    """
-    given = given_torques(plant, model, q, qd, command)
-    return inverse_dynamics(plant, model, q, qd, qdd) - given
-
-
 def given_torques(
     plant: Plant, model: mujoco.MjModel, q: Float64, qd: Float64, command: Float64
 ) -> Float64:

@@ -54,7 +54,7 @@ def test_goals_and_positions_of_a_servo_are_read_by_name(tmp_path: Path):
     assert model.actuator_gainprm[0, 0] == 30.0
 
 
-def test_a_light_arm_needs_the_torques_that_were_logged(
+def test_a_light_arm_with_the_same_seed_hides_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setattr(light_arm, "_SECONDS", 3.9)
