@@ -29,10 +29,12 @@ from shared.identification.progress import Progress
 from shared.identification.search.bare import (
     astray,
     lacking,
+    leads_astray,
     loads_of,
     no_more,
     offsets_of,
     screened_of,
+    with_all,
     with_drives,
 )
 from shared.identification.search.family import Family
@@ -95,16 +97,18 @@ def begin(
     progress("base fit", 0.0, f"{len(known)} parameters" + ("" if fits is None else ", kept"))
     step = _Step(released, shown, candidates, seed, progress, fits)
     is_pushed = fits is not None and fits.is_torque
-    done, family = (None, None) if is_pushed else step.from_base(problem, rng)
-    is_new = fits is None and family is None and lacks and not noise.is_measured
-    if done is None or is_new:
+    begun = None if is_pushed else step.from_base(problem, rng)
+    is_new = fits is None and lacks and not noise.is_measured
+    if begun is None or (is_new and begun[1] is None):
         progress("base fit", 0.5, "as an arm that torques push which nobody knows")
         by_torque = replace(problem, noise=astray(Space(full, lacks)))
-        other, found = step.from_base(by_torque, rng)
+        pushed_arm = step.from_base(by_torque, rng)
+        assert pushed_arm is not None  # torques do not speak against torques
         # Where drives show in neither, links tell: torques that nobody knows bend them in one.
-        is_bent = done is not None and _held_of(done, released) > _held_of(other, released)
-        if done is None or found is not None or is_bent:
-            done, family = other, found
+        held = _held_of(pushed_arm[0], released)
+        if begun is None or pushed_arm[1] is not None or _held_of(begun[0], released) > held:
+            begun = pushed_arm
+    done, family = begun
     problem = done.whole.space.problem
     if problem.noise.is_torque:
         candidates = _shown_by_torques(problem, candidates, ruled_out)
@@ -149,8 +153,11 @@ class _Step:
 
     def from_base(
         self, problem: Problem, rng: np.random.Generator
-    ) -> tuple[BaseFits, Family | None]:
-        """Return the fits; parameters that they bend beyond belief are not released."""
+    ) -> tuple[BaseFits, Family | None] | None:
+        """Return the fits; parameters that they bend beyond belief are not released.
+
+        None if torques speak against what replays make of drives.
+        """
         space, fits = Space(problem), self.fits
         done = (
             with_shown(fit_base(space, rng), self.shown) if fits is None else fit_again(space, fits)
@@ -158,12 +165,17 @@ class _Step:
         if fits is None and problem.noise.has_free_starts:
             done = with_starts(done)
         problem = done.whole.space.problem
-        if lacking(done.whole.space, self.candidates):
+        together = None
+        if lacks := lacking(done.whole.space, self.candidates):
             self.progress(
                 "base fit", 0.5, "with friction and rotors of all joints that the file lacks"
             )
+            together = with_all(problem, lacks)
+            is_known = problem.noise.is_measured or problem.noise.is_torque
+            if fits is None and not is_known and leads_astray(together):
+                return None
         is_held = any(each not in problem.parameters for each in self.released)
-        family = _drives(done, self.candidates, self.seed, is_held)
+        family = _drives(done, self.candidates, self.seed, is_held, together)
         best = done.whole if family is None else family.fit
         if fits is None and (doubted := doubted_of(best)):
             # What is known of a link does not hold, so the base may not bend it: what is wrong
@@ -239,13 +251,25 @@ def begin_without(found: Search, gone: Sequence[int], *, seed: int) -> Search:
 
 
 def _drives(
-    done: BaseFits, candidates: Sequence[Candidate], seed: int, is_held: bool
-) -> Family | None:
-    """Return what the model file lacks of the drives; beside a load where links are held."""
-    lacks = lacking(done.whole.space, candidates)
+    done: BaseFits, candidates: Sequence[Candidate], seed: int, is_held: bool,
+    together: Fit | None = None,
+) -> Family | None:  # fmt: skip
+    """Return what the model file lacks of the drives; beside a load where links are held.
+
+    Args:
+        done: the fits of the base.
+        candidates: what is looked for.
+        seed: of everything random.
+        is_held: whether the base may not bend some of its links.
+        together: a fit with all that the file may lack, if there is one already.
+    """
+    if together is None:
+        if not (lacks := lacking(done.whole.space, candidates)):
+            return None
+        together = with_all(done.whole.space.problem, lacks)
     loads = loads_of(candidates) if is_held else ()
     rng = np.random.default_rng([seed, 3])
-    return with_drives(done.whole, lacks, rng, loads, offsets_of(candidates))
+    return with_drives(done.whole, together, rng, loads, offsets_of(candidates))
 
 
 def _held(done: BaseFits, gone: Sequence[int]) -> BaseFits:

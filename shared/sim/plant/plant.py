@@ -269,7 +269,8 @@ def _drives(
         if compiled.actuator_trntype[index] == mujoco.mjtTrn.mjTRN_JOINT:
             joint = compiled.joint(int(compiled.actuator_trnid[index, 0])).name
             targets[joint] = names[index]
-    has_position = all(compiled.actuator_biastype[:] == mujoco.mjtBias.mjBIAS_AFFINE)
+    is_servo = compiled.actuator_biastype[:] == mujoco.mjtBias.mjBIAS_AFFINE
+    has_position = all(is_servo)
     found = [name if name in names else targets.get(name, "") for name in columns]
     if control == "torque" and (not compiled.nu or has_position):
         if sorted(columns) != sorted(joints):
@@ -283,6 +284,12 @@ def _drives(
         raise IdentificationError(
             f"{path} has no actuator for the command's column {', '.join(lost) or columns}; "
             f"it has: {', '.join(names) or 'none'}"
+        )
+    servos = [name for name in found if is_servo[compiled.actuator(name).id]]
+    if control == "torque" and servos:
+        raise IdentificationError(
+            f'{path}: control = "torque", but there are servos ({", ".join(servos)}), which are '
+            "told no torque: give these joints motors, and their columns the torque that they got"
         )
     if control == "position" and not has_position:
         raise IdentificationError(

@@ -6,15 +6,15 @@ from pathlib import Path
 import pytest
 
 from shared.errors import IdentificationError
-from shared.sim.plant.plant import mjcf
+from shared.sim.plant.plant import Control, mjcf
 from tests.arms import JOINTS, write_arm
 
 _TABLE = '<body name="table" pos="1 0 0"><freejoint name="loose"/><geom size="0.1"/></body>'
 
 
-def _refusal(path: Path, joints: Sequence[str]) -> str:
+def _refusal(path: Path, joints: Sequence[str], control: Control = "position") -> str:
     with pytest.raises(IdentificationError) as caught:
-        mjcf(path, "position", tuple(joints), tuple(joints), "tool")
+        mjcf(path, control, tuple(joints), tuple(joints), "tool")
     return str(caught.value)
 
 
@@ -34,3 +34,13 @@ def test_what_is_loose_is_to_be_taken_out_and_not_to_be_logged(tmp_path: Path) -
     said = _refusal(path, JOINTS)
     assert "joint 'loose' is no hinge or slide" in said
     assert "take it out of the MJCF" in said
+
+
+def test_a_servo_among_motors_is_named_where_commands_are_torques(tmp_path: Path) -> None:
+    path = write_arm(tmp_path, "torque")
+    text = path.read_text()
+    motor = text[text.index("<motor") :].split(">")[0]
+    assert JOINTS[0] in motor
+    path.write_text(text.replace(motor, motor.replace("<motor", '<position kp="100"')))
+    said = _refusal(path, JOINTS, "torque")
+    assert f"servos ({JOINTS[0]}), which are told no torque: give these joints motors" in said
