@@ -29,6 +29,7 @@ from shared.identification.search.begin import begin, begin_without, doubted_of
 from shared.identification.search.bent import is_worse, otherwise, worse_than_file
 from shared.identification.search.beyond import is_of_gears, is_seen_beyond, may_be_beyond
 from shared.identification.search.cleared import clear
+from shared.identification.search.far import bent_beyond_belief
 from shared.identification.search.likeness import is_only_like
 from shared.identification.search.misstated import misstated
 from shared.identification.search.once import is_named, take_back_pushes, take_pushes
@@ -290,6 +291,7 @@ def _verdict(
                 [
                     worse_than_file(found),
                     conclusion.far,
+                    bent_beyond_belief(found),
                     _shorter_step(found, dataset),
                     _beyond_gears(found, dataset),
                     coarse_step(found.base),

@@ -17,8 +17,8 @@ import numpy as np
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
 from shared.identification.fitting.base import floor_at
-from shared.identification.fitting.fit import Fit, go_down, polish
-from shared.identification.fitting.problem import Problem
+from shared.identification.fitting.fit import Fit, descend, go_down, polish
+from shared.identification.fitting.problem import Problem, Variant
 from shared.identification.fitting.space import Space
 from shared.identification.fitting.torques import by_torques
 from shared.identification.gate.certainty import is_there
@@ -80,13 +80,18 @@ def astray(space: Space) -> Noise:
     Args:
         space: with drives, and a noise that repeats have not measured.
     """
-    noise, joints = space.problem.noise, len(space.problem.noise.joints)
+    return _of_missing(space.problem, space.variant(by_torques(space)))
+
+
+def _of_missing(problem: Problem, led: Variant) -> Noise:
+    """Return noise that is the torques which a model lacks."""
+    noise, joints = problem.noise, len(problem.noise.joints)
     noise = replace(
         noise, tracker=None, correlation=noise.correlation[:joints], start_doubt=None,
         memory=None, torque=np.ones(joints),
     )  # fmt: skip
-    problem = replace(space.problem, noise=noise)
-    left = problem.plain(space.variant(by_torques(space)), problem.of("train"))
+    problem = replace(problem, noise=noise)
+    left = problem.plain(led, problem.of("train"))
     size = np.maximum(np.sqrt(np.mean(np.concatenate(left) ** 2, axis=0)), _LEAST_TORQUE)
     return replace(noise, torque=size)
 
@@ -127,42 +132,51 @@ def leads_astray(together: Fit) -> bool:
         together: with all drives there may be, of a noise that repeats have not measured.
     """
     space = together.space
-    problem = replace(space.problem, noise=astray(space))
-    test = problem.of("test")
-    led = stretches(problem, space.variant(by_torques(space)), test)
-    return bool(stretches(problem, together.variant, test).mean() > _FAR * led.mean())
+    led = space.variant(by_torques(space))
+    problem = replace(space.problem, noise=_of_missing(space.problem, led))
+    found, least = (
+        float(stretches(problem, each, problem.of("test")).mean())
+        for each in (together.variant, led)
+    )
+    return found > _FAR * least
 
 
 def with_drives(
     base: Fit,
-    together: Fit,
+    lacks: tuple[Candidate, ...],
     rng: np.random.Generator,
     loads: tuple[Candidate, ...] = (),
     offsets: tuple[Candidate, ...] = (),
+    together: Fit | None = None,
 ) -> Family | None:
     """Return what the drives have that the file lacks; None if nothing surely is there.
 
     Args:
         base: without any cause.
-        together: with all there may be, see :func:`with_all`.
+        lacks: what there may be, effect by effect.
         rng: draws.
         loads: of which there may be one, too, fewest numbers first.
         offsets: of which there may be one at each joint that does not show all of what it lacks.
+        together: a fit of all that it may lack, if there is one.
     """
-    problem, lacks = base.space.problem, together.space.candidates
+    if not lacks:
+        return None
+    problem = base.space.problem
     train, test = problem.of("train"), problem.of("test")
     before = stretches(problem, base.variant, test)
-    for load in loads:
-        other = _fitted(Space(problem, (*lacks, load)), train)
-        if other.cost < together.cost - _MUCH_BETTER:
-            together = other
+    if loads:
+        together = _with_load(problem, lacks, loads, together)
+    elif together is None:
+        together = with_all(problem, lacks)
     kept = _needed(together, test, rng)
     odd = {each.place for each in set(lacks) - set(kept)}
     pushed = tuple(each for each in offsets if each.place in odd)
     if kept and pushed:
-        other = _fitted(Space(problem, (*together.space.candidates, *pushed)), train)
+        space = Space(problem, (*together.space.candidates, *pushed))
+        other = _grown(together, space, [np.r_[together.z, np.zeros(len(pushed))]])
         if other.cost < together.cost - _MUCH_BETTER:
-            together, kept = other, _needed(other, test, rng)
+            together = polish(space, other.z, train, _STEPS)
+            kept = _needed(together, test, rng)
     if not (set(kept) & set(lacks) or problem.noise.is_torque):
         return None  # what the tool carries, or pushes, is found like any other cause
     own = _with_kinds(kept, together, lacks, rng)
@@ -192,6 +206,42 @@ def screened_of(fit: Fit, candidate: Candidate) -> Screened:
 
 def _fitted(space: Space, train: tuple[int, ...]) -> Fit:
     return polish(space, by_torques(space), train, _STEPS)
+
+
+def _with_load(
+    problem: Problem, lacks: tuple[Candidate, ...], loads: Sequence[Candidate], alone: Fit | None
+) -> Fit:
+    """Return a fit of all that a file may lack, and of the load of fewest numbers that is needed.
+
+    It begins with the load that may be any: where there is one, without it nothing comes down.
+
+    Args:
+        problem: of which the base may bend.
+        lacks: of drives.
+        loads: fewest numbers first.
+        alone: a fit without a load, if there is one.
+    """
+    train = problem.of("train")
+    most = _fitted(Space(problem, (*lacks, loads[-1])), train)
+    enough = most.cost + _MUCH_BETTER
+    if alone is None:
+        alone = _with_fewer(most, lacks)
+        if alone.cost <= enough:
+            return polish(alone.space, alone.z, train, _STEPS)
+    if alone.cost <= enough:
+        return alone
+    for load in loads[:-1]:
+        space = alone.space.grown(load)
+        led = by_torques(space)
+        other = _grown(alone, space, [led, np.r_[alone.z, led[space.where(load)]]])
+        if other.cost <= enough:
+            return polish(space, other.z, train, _STEPS)
+    return most
+
+
+def _grown(fit: Fit, space: Space, starts: list[Float64]) -> Fit:
+    """Return a fit with more causes than a fit has, by the derivative there; only theirs is new."""
+    return descend(space, starts, fit.jacobian, space.problem.of("train"), fit.space.size)
 
 
 def _with_fewer(fit: Fit, chosen: Sequence[Candidate]) -> Fit:

@@ -263,13 +263,10 @@ def _drives(
         is_held: whether the base may not bend some of its links.
         together: a fit with all that the file may lack, if there is one already.
     """
-    if together is None:
-        if not (lacks := lacking(done.whole.space, candidates)):
-            return None
-        together = with_all(done.whole.space.problem, lacks)
+    lacks = lacking(done.whole.space, candidates)
     loads = loads_of(candidates) if is_held else ()
     rng = np.random.default_rng([seed, 3])
-    return with_drives(done.whole, together, rng, loads, offsets_of(candidates))
+    return with_drives(done.whole, lacks, rng, loads, offsets_of(candidates), together)
 
 
 def _held(done: BaseFits, gone: Sequence[int]) -> BaseFits:

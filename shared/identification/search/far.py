@@ -6,10 +6,11 @@ import numpy as np
 
 from shared.identification.dataset.types import Float64
 from shared.identification.fitting.fit import Fit, polish
-from shared.identification.fitting.parameters import INERTIA_PRIOR, BaseParameter
+from shared.identification.fitting.parameters import INERTIA_PRIOR, BaseParameter, bends
 from shared.identification.fitting.space import Space
 from shared.identification.gate.certainty import half_widths
 from shared.identification.gate.held_out import stretches
+from shared.identification.search.begin import FAR_FROM_KNOWN
 from shared.identification.search.searched import Far, Search
 from shared.telemetry.wording import listing
 
@@ -95,6 +96,25 @@ def far_from_file(found: Search) -> str:
         for index in shown_far(found)[:_TOLD]
     ]
     return f"the base is far from the model file: {listing(said)} what it says" if said else ""
+
+
+def bent_beyond_belief(found: Search) -> str:
+    """Return in words which links a search's model has further off than is known, or nothing."""
+    z, parameters = found.current.z, found.problem.parameters
+    off = np.abs(bends(parameters, z))
+    furthest = sorted(range(len(parameters)), key=lambda index: -off[index])[:_TOLD]
+    said = [
+        f"{each.name} {each.value(float(z[index])):.3g} {each.unit} for {each.nominal:.3g}"
+        for index in furthest
+        for each in (parameters[index],)
+        if off[index] > FAR_FROM_KNOWN
+    ]
+    if not said:
+        return ""
+    return (
+        f"links are further from the model file than is believable ({listing(said)}): they make "
+        "up for something that is not named, as would torques that are not to scale"
+    )
 
 
 def is_of_file(each: BaseParameter) -> bool:

@@ -20,7 +20,6 @@ from shared.identification.search.bare import (
     no_more,
     offsets_of,
     screened_of,
-    with_all,
     with_drives,
 )
 from tests.arms import JOINTS, make_plant, make_subject
@@ -40,7 +39,7 @@ def test_joints_that_rub_are_named_and_viscous_friction_that_is_in_the_file_is_n
     base = _base(problem)
     lacks = lacking(base.space, candidates(problem, *DRIVES))
     assert [each.label for each in lacks] == [f"coulomb_friction {joint}" for joint in JOINTS]
-    found = with_drives(base, with_all(problem, lacks), np.random.default_rng(0))
+    found = with_drives(base, lacks, np.random.default_rng(0))
     assert found is not None
     assert set(found.gains) == set(lacks)
     assert found.losses.mean() < 0.01
@@ -55,7 +54,7 @@ def test_a_load_is_found_with_them_where_there_is_one(tmp_path: Path, load: floa
     known = candidates(problem, "coulomb_friction", "payload")
     base = _base(problem)
     lacks = lacking(base.space, known)
-    found = with_drives(base, with_all(problem, lacks), np.random.default_rng(0), loads_of(known))
+    found = with_drives(base, lacks, np.random.default_rng(0), loads_of(known))
     assert found is not None
     space = found.fit.space
     carried = [each for each in found.gains if each.effect.name == "payload"]
@@ -70,10 +69,8 @@ def test_a_joint_that_something_pushes_shows_what_others_have_beside_that(tmp_pa
     base = _base(problem)
     lacks = lacking(base.space, known)
     assert not {each.effect.name for each in lacks} - set(DRIVES)
-    alone = with_drives(base, with_all(problem, lacks), np.random.default_rng(0))
-    found = with_drives(
-        base, with_all(problem, lacks), np.random.default_rng(0), offsets=offsets_of(known)
-    )
+    alone = with_drives(base, lacks, np.random.default_rng(0))
+    found = with_drives(base, lacks, np.random.default_rng(0), offsets=offsets_of(known))
     assert found is not None
     (pushed,) = (each for each in found.gains if each.effect.name == "torque_bias")
     assert pushed.place == JOINTS[0]
@@ -93,10 +90,7 @@ def test_a_load_of_an_arm_that_does_not_rub_is_left_to_the_search(
     known = candidates(problem, "coulomb_friction", "payload")
     base = _base(problem)
     lacks = lacking(base.space, known)
-    assert (
-        with_drives(base, with_all(problem, lacks), np.random.default_rng(0), loads_of(known))
-        is None
-    )
+    assert with_drives(base, lacks, np.random.default_rng(0), loads_of(known)) is None
 
 
 def test_what_an_arm_without_rotors_leaves_says_nothing_of_noise(tmp_path: Path):
@@ -116,6 +110,7 @@ def test_nothing_is_lacking_where_the_file_has_it_or_a_servo_holds_the_arm(tmp_p
     assert lacking(Space(problem), candidates(problem, "payload")) == ()
     servo = replace(problem, subject=make_subject(make_plant(tmp_path)))
     assert lacking(Space(servo), candidates(problem, *DRIVES)) == ()
+    assert with_drives(_base(problem), (), np.random.default_rng(0)) is None
 
 
 def test_kinds_without_which_all_is_left_come_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -124,7 +119,7 @@ def test_kinds_without_which_all_is_left_come_back(tmp_path: Path, monkeypatch: 
     lacks = lacking(base.space, candidates(problem, *DRIVES))
     viscous = tuple(each for each in lacks if each.effect.name == "viscous_friction")
     monkeypatch.setattr(bare, "_needed", lambda *_: viscous)  # as of motion that tells little
-    found = with_drives(base, with_all(problem, lacks), np.random.default_rng(0))
+    found = with_drives(base, lacks, np.random.default_rng(0))
     assert found is not None
     assert {each.effect.name for each in found.gains} == set(DRIVES)
     sizes = dict(zip(found.fit.space.candidates, found.fit.space.values(found.fit.z), strict=True))
