@@ -65,12 +65,12 @@ def look(
         progress("screen", 0.5, "again, from the nominal model")
         far = Fit.at(fit.space, nominal.with_causes_of(fit), segments, is_rough=True)
         known = {each.candidate for each, _ in picked}
-        new = [
-            each
-            for each in _diverse(screen(far, candidates, segments), slight)
-            if each.candidate not in known and each.candidate.recording is None
-        ]
-        picked += [(each, far) for each in new[:_MORE]]
+        there = _diverse(screen(far, candidates, segments), slight)
+        there = [each for each in there if each.candidate.recording is None]
+        new = [each for each in there if each.candidate not in known]
+        # What a bent base shows of a large cause is a fraction of it, from where no way leads.
+        largest = [each for each in there[:_MORE] if each not in new]
+        picked += [(each, far) for each in (*largest, *new[:_MORE])]
     tried = {each.candidate for each, _ in picked}
     others = [each for each in screened if each.candidate not in tried]
     found: list[Rough] = []
@@ -80,7 +80,8 @@ def look(
         found.append(late or refit(fit, nominal, each, segments, begun))
     found += [late for each in others if (late := _late(found, each, fit, segments))]
     found.sort(key=lambda entry: entry.ratio)
-    return screened, found
+    first = {each.screened.candidate: each for each in reversed(found)}
+    return screened, [each for each in found if first[each.screened.candidate] is each]
 
 
 def _has_turns(screened: Screened) -> bool:

@@ -1,5 +1,7 @@
 """What is looked at more closely, and from where."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -11,10 +13,12 @@ from shared.identification.catalogue.sample_and_hold import EFFECT as HOLD
 from shared.identification.catalogue.torque_saturation import EFFECT as SATURATION
 from shared.identification.effect import Candidate
 from shared.identification.fitting.fit import Fit, Start, polish
+from shared.identification.fitting.refit import Rough, refit
 from shared.identification.fitting.space import Space
 from shared.identification.hidden.generator import simulated
 from shared.identification.hidden.recipe import Recipe, wish_of
 from shared.identification.progress import silent
+from shared.identification.search import look as module
 from shared.identification.search.look import (
     _diverse,  # pyright: ignore[reportPrivateUsage]
     look,
@@ -58,6 +62,23 @@ def test_seen_from_the_nominal_model_it_comes_first(bent: tuple[Fit, Start]):
     assert rough[0].space.values(rough[0].z)[0][0] == pytest.approx(0.8, rel=0.05)
     assert rough[0].ratio < 0.01
     assert [each.ratio for each in rough] == sorted(each.ratio for each in rough)
+
+
+def test_what_the_nominal_model_shows_best_is_refitted_from_there_though_the_base_shows_it_too(
+    bent: tuple[Fit, Start], monkeypatch: pytest.MonkeyPatch
+):
+    fit, nominal = bent
+    begun_at: list[tuple[Candidate, bool]] = []
+
+    def noted(fit: Fit, nominal: Start, screened: Screened, *others: Any) -> Rough:
+        begun_at.append((screened.candidate, others[-1] is fit))
+        return refit(fit, nominal, screened, *others)
+
+    monkeypatch.setattr(module, "refit", noted)
+    load = CANDIDATES[-1]
+    _, rough = look(fit, nominal, (load,), True, silent)
+    assert begun_at == [(load, True), (load, False)]
+    assert [each.screened.candidate for each in rough] == [load]
 
 
 @pytest.mark.slow
