@@ -24,7 +24,7 @@ from shared.identification.fitting.whole import fit_to_all
 from shared.identification.leftover.located import leftovers
 from shared.identification.progress import Progress, silent
 from shared.identification.search.again import fresh, leave_out, pushed_in
-from shared.identification.search.bare import counted_by_torque
+from shared.identification.search.astray import counted_by_torque
 from shared.identification.search.begin import begin, begin_without, doubted_of
 from shared.identification.search.bent import is_worse, otherwise, worse_than_file
 from shared.identification.search.beyond import is_of_gears, is_seen_beyond, may_be_beyond

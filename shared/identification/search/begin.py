@@ -26,12 +26,10 @@ from shared.identification.fitting.space import Space
 from shared.identification.gate.held_out import stretches
 from shared.identification.noise.floor import noise_of
 from shared.identification.progress import Progress
+from shared.identification.search.astray import astray, leads_astray, no_more
 from shared.identification.search.bare import (
-    astray,
     lacking,
-    leads_astray,
     loads_of,
-    no_more,
     offsets_of,
     screened_of,
     with_all,

@@ -9,21 +9,16 @@ import pytest
 from shared.identification.fitting.fit import Fit
 from shared.identification.fitting.problem import Problem
 from shared.identification.fitting.space import Space
-from shared.identification.fitting.torques import by_torques
 from shared.identification.search import bare
 from shared.identification.search.bare import (
-    astray,
-    counted_by_torque,
     lacking,
-    leads_astray,
     loads_of,
-    no_more,
     offsets_of,
     screened_of,
     with_drives,
 )
 from tests.arms import JOINTS, make_plant, make_subject
-from tests.geared import FRICTION, SENSED, candidates, problem_of_geared
+from tests.geared import FRICTION, candidates, problem_of_geared
 
 DRIVES = ("coulomb_friction", "viscous_friction", "rotor_inertia")
 
@@ -93,16 +88,6 @@ def test_a_load_of_an_arm_that_does_not_rub_is_left_to_the_search(
     assert with_drives(base, lacks, np.random.default_rng(0), loads_of(known)) is None
 
 
-def test_what_an_arm_without_rotors_leaves_says_nothing_of_noise(tmp_path: Path):
-    problem = problem_of_geared(tmp_path, is_bare=True)
-    read = replace(problem.noise, joints=np.full(len(JOINTS), 1e-5))
-    space = Space(replace(problem, noise=read), candidates(problem, *DRIVES))
-    wild = replace(problem.noise, joints=np.full(len(JOINTS), 20.0))
-    assert no_more(wild, space).joints.max() < 5e-3
-    calm = replace(problem.noise, joints=np.full(len(JOINTS), 1e-6))
-    assert no_more(calm, space).joints == pytest.approx(calm.joints)
-
-
 def test_nothing_is_lacking_where_the_file_has_it_or_a_servo_holds_the_arm(tmp_path: Path):
     problem = problem_of_geared(tmp_path)
     one = candidates(problem, "coulomb_friction")[:1]
@@ -125,34 +110,3 @@ def test_kinds_without_which_all_is_left_come_back(tmp_path: Path, monkeypatch: 
     sizes = dict(zip(found.fit.space.candidates, found.fit.space.values(found.fit.z), strict=True))
     rubs = {each.place: sizes[each][0] for each in lacks if each.effect.name == "coulomb_friction"}
     assert rubs == pytest.approx(FRICTION, rel=0.1)
-
-
-def test_where_torques_push_an_arm_that_nobody_knows_neither_weight_nor_friction_hides_them(
-    tmp_path: Path,
-):
-    problem = problem_of_geared(tmp_path, is_sensed=True)
-    space = Space(problem, candidates(problem, "coulomb_friction"))
-    light = by_torques(space)
-    heavy, stuck = light.copy(), light.copy()
-    for index, parameter in enumerate(problem.parameters):
-        if parameter.name.startswith("armature"):
-            heavy[index] = np.log(0.3 / parameter.nominal)  # where an arm goes on as it began
-    stuck[space.base_size :] *= 20.0
-    noise = astray(space)
-    pushed = Space(replace(problem, noise=noise), space.candidates)
-    train = problem.of("train")
-
-    def left(space: Space, z: np.ndarray) -> float:
-        return float(np.mean(space.problem.vector([space.variant(z)], train) ** 2))
-
-    assert noise.is_torque
-    assert noise.torque is not None
-    assert "torque" in counted_by_torque(noise)
-    assert counted_by_torque(problem.noise) == ""
-    for wrong in (heavy, stuck):
-        worse = left(space, wrong) / left(space, light)
-        assert left(pushed, wrong) / left(pushed, light) > 3.0 * worse
-        assert leads_astray(Fit.at(space, wrong, train))
-    assert not leads_astray(Fit.at(space, light, train))
-    sizes = [values[0] for values in pushed.values(light)]
-    assert sizes == pytest.approx([SENSED * FRICTION[joint] for joint in JOINTS], rel=0.3)
