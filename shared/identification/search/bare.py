@@ -78,7 +78,7 @@ def with_drives(
         rng: draws.
         loads: of which there may be one, too, fewest numbers first.
         offsets: of which there may be one at each joint that does not show all of what it lacks.
-        together: a fit of all that it may lack, if there is one.
+        together: a fit of all that it may lack, if there is one, beside no load.
     """
     if not lacks:
         return None
@@ -86,7 +86,7 @@ def with_drives(
     train, test = problem.of("train"), problem.of("test")
     before = stretches(problem, base.variant, test)
     if loads:
-        together = _with_load(problem, lacks, loads, together)
+        together = _with_load(problem, lacks, loads)
     elif together is None:
         together = with_all(problem, lacks)
     kept = _needed(together, test, rng)
@@ -129,9 +129,7 @@ def _fitted(space: Space, train: tuple[int, ...]) -> Fit:
     return polish(space, by_torques(space), train, _STEPS)
 
 
-def _with_load(
-    problem: Problem, lacks: tuple[Candidate, ...], loads: Sequence[Candidate], alone: Fit | None
-) -> Fit:
+def _with_load(problem: Problem, lacks: tuple[Candidate, ...], loads: Sequence[Candidate]) -> Fit:
     """Return a fit of all that a file may lack, and of the load of fewest numbers that is needed.
 
     It begins with the load that may be any: where there is one, without it nothing comes down.
@@ -140,17 +138,13 @@ def _with_load(
         problem: of which the base may bend.
         lacks: of drives.
         loads: fewest numbers first.
-        alone: a fit without a load, if there is one.
     """
     train = problem.of("train")
     most = _fitted(Space(problem, (*lacks, loads[-1])), train)
     enough = most.cost + _MUCH_BETTER
-    if alone is None:
-        alone = _with_fewer(most, lacks)
-        if alone.cost <= enough:
-            return polish(alone.space, alone.z, train, _STEPS)
+    alone = _with_fewer(most, lacks)
     if alone.cost <= enough:
-        return alone
+        return polish(alone.space, alone.z, train, _STEPS)
     for load in loads[:-1]:
         space = alone.space.grown(load)
         led = by_torques(space)

@@ -163,17 +163,18 @@ class _Step:
         if fits is None and problem.noise.has_free_starts:
             done = with_starts(done)
         problem = done.whole.space.problem
+        is_held = any(each not in problem.parameters for each in self.released)
         together = None
         if lacks := lacking(done.whole.space, self.candidates):
             self.progress(
                 "base fit", 0.5, "with friction and rotors of all joints that the file lacks"
             )
-            together = with_all(problem, lacks)
-            is_known = problem.noise.is_measured or problem.noise.is_torque
-            if fits is None and not is_known and leads_astray(together):
-                return None
-        is_held = any(each not in problem.parameters for each in self.released)
-        family = _drives(done, self.candidates, self.seed, is_held, together)
+            if not is_held:  # else it begins with a load
+                together = with_all(problem, lacks)
+                is_known = problem.noise.is_measured or problem.noise.is_torque
+                if fits is None and not is_known and leads_astray(together):
+                    return None
+        family = _drives(done, self.candidates, self.seed, together)
         best = done.whole if family is None else family.fit
         if fits is None and (doubted := doubted_of(best)):
             # What is known of a link does not hold, so the base may not bend it: what is wrong
@@ -181,7 +182,7 @@ class _Step:
             bent = ", ".join(problem.parameters[index].name for index in doubted)
             self.progress("base fit", 0.5, f"without {bent}")
             done = _held(done, doubted)
-            family = _drives(done, self.candidates, self.seed, is_held=True)
+            family = _drives(done, self.candidates, self.seed)
         return done, family
 
 
@@ -240,7 +241,7 @@ def begin_without(found: Search, gone: Sequence[int], *, seed: int) -> Search:
     done = _held(BaseFits(found.nominal, found.base_parts, found.base), gone)
     return begun_with(
         done,
-        _drives(done, found.candidates, seed, is_held=True),
+        _drives(done, found.candidates, seed),
         seed=seed,
         candidates=found.candidates,
         ruled_out=found.ruled_out,
@@ -249,20 +250,19 @@ def begin_without(found: Search, gone: Sequence[int], *, seed: int) -> Search:
 
 
 def _drives(
-    done: BaseFits, candidates: Sequence[Candidate], seed: int, is_held: bool,
-    together: Fit | None = None,
-) -> Family | None:  # fmt: skip
+    done: BaseFits, candidates: Sequence[Candidate], seed: int, together: Fit | None = None
+) -> Family | None:
     """Return what the model file lacks of the drives; beside a load where links are held.
 
     Args:
         done: the fits of the base.
         candidates: what is looked for.
         seed: of everything random.
-        is_held: whether the base may not bend some of its links.
-        together: a fit with all that the file may lack, if there is one already.
+        together: a fit with all that the file may lack; None where the base may not bend some of
+            its links.
     """
     lacks = lacking(done.whole.space, candidates)
-    loads = loads_of(candidates) if is_held else ()
+    loads = loads_of(candidates) if together is None else ()
     rng = np.random.default_rng([seed, 3])
     return with_drives(done.whole, lacks, rng, loads, offsets_of(candidates), together)
 

@@ -10,7 +10,7 @@ from shared.identification.fitting.parameters import INERTIA_PRIOR, BaseParamete
 from shared.identification.fitting.space import Space
 from shared.identification.gate.certainty import half_widths
 from shared.identification.gate.held_out import stretches
-from shared.identification.search.begin import FAR_FROM_KNOWN
+from shared.identification.search.begin import doubted_of
 from shared.identification.search.searched import Far, Search
 from shared.telemetry.wording import listing
 
@@ -100,14 +100,13 @@ def far_from_file(found: Search) -> str:
 
 def bent_beyond_belief(found: Search) -> str:
     """Return in words which links a search's model has further off than is known, or nothing."""
-    z, parameters = found.current.z, found.problem.parameters
-    off = np.abs(bends(parameters, z))
-    furthest = sorted(range(len(parameters)), key=lambda index: -off[index])[:_TOLD]
+    fit, parameters = found.current, found.problem.parameters
+    off = np.abs(bends(parameters, fit.z))
+    furthest = sorted(doubted_of(fit), key=lambda index: -off[index])[:_TOLD]
     said = [
-        f"{each.name} {each.value(float(z[index])):.3g} {each.unit} for {each.nominal:.3g}"
+        f"{each.name} {each.value(float(fit.z[index])):.3g} {each.unit} for {each.nominal:.3g}"
         for index in furthest
         for each in (parameters[index],)
-        if off[index] > FAR_FROM_KNOWN
     ]
     if not said:
         return ""

@@ -18,7 +18,8 @@ from shared.identification.search.windows import closer
 _TRIED = 6
 """Candidates that are refitted with the base's derivative kept."""
 _MORE = 2
-"""Further ones that only the nominal model shows."""
+"""Further ones that only the nominal model shows; and of those that it shows best, as many from
+there, too."""
 _PER_EFFECT = 3
 """Places of one effect among those tried."""
 _SLIGHT = 0.015
@@ -69,7 +70,7 @@ def look(
         there = [each for each in there if each.candidate.recording is None]
         new = [each for each in there if each.candidate not in known]
         # What a bent base shows of a large cause is a fraction of it, from where no way leads.
-        largest = [each for each in there[:_MORE] if each not in new]
+        largest = [each for each in there[:_MORE] if each.candidate in known]
         picked += [(each, far) for each in (*largest, *new[:_MORE])]
     tried = {each.candidate for each, _ in picked}
     others = [each for each in screened if each.candidate not in tried]
