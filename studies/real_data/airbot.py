@@ -9,13 +9,12 @@ drives.
 Run ``python -m studies.real_data.airbot OUT --raw FOLDER``.
 """
 
-import argparse
 from pathlib import Path
 
 import numpy as np
 
 from shared.identification.dataset.types import Float64
-from studies.real_data.folders import arm_of_motors, hashes_of, in_parts, there, write
+from studies.real_data.folders import arm_of_motors, hashes_of, in_parts, parser_of, there, write
 
 JOINTS = tuple(f"joint{number}" for number in range(1, 7))
 FILES = ("identification_q_real.csv", "identification_tau_real.csv")
@@ -68,9 +67,7 @@ def model() -> str:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", type=Path, help="the new folder")
-    parser.add_argument("--raw", type=Path, required=True, help="where the recordings lie")
+    parser = parser_of(__doc__)
     parser.add_argument("--rows", type=int, default=462, help="the last ones that are taken (462)")
     parser.add_argument("--parts", type=int, default=3, help="recordings that they become (3)")
     args = parser.parse_args()

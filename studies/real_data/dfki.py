@@ -8,14 +8,13 @@ and inertias (``params_C.1_model_1.0.yml``), their reflected inertia, and none o
 Run ``python -m studies.real_data.dfki OUT --raw ../shared/data/dfki_double_pendulum``.
 """
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from shared.identification.dataset.types import Float64, Split, Trajectory
-from studies.real_data.folders import arm_of_motors, hashes_of, recording, there, write
+from studies.real_data.folders import arm_of_motors, hashes_of, parser_of, recording, there, write
 
 JOINTS = ("shoulder", "elbow")
 PARAMETERS = "params_C.1_model_1.0.yml"
@@ -81,9 +80,7 @@ def _model(of: dict[str, float]) -> str:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", type=Path, help="the new folder")
-    parser.add_argument("--raw", type=Path, default=Path("../shared/data/dfki_double_pendulum"))
+    parser = parser_of(__doc__, Path("../shared/data/dfki_double_pendulum"))
     parser.add_argument("--train", nargs="+", default=TRAIN, metavar="TIME", help="to fit to")
     parser.add_argument("--test", nargs="+", default=TEST, metavar="TIME", help="to hold out")
     args = parser.parse_args()

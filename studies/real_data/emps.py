@@ -9,7 +9,6 @@ carriage follows as 95 kg do. The pulses are hidden by taking them out of ``vir`
 Run ``python -m studies.real_data.emps OUT --raw ../shared/data/emps``.
 """
 
-import argparse
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -17,7 +16,7 @@ import numpy as np
 from scipy.io import loadmat
 
 from shared.identification.dataset.types import Float64, Trajectory
-from studies.real_data.folders import hashes_of, recording, there, write
+from studies.real_data.folders import hashes_of, parser_of, recording, there, write
 
 JOINT = "carriage"
 MODEL = f"""<mujoco model="emps">
@@ -74,9 +73,7 @@ def _read(path: Path, name: str, pulses: Pulses) -> Trajectory:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", type=Path, help="the new folder")
-    parser.add_argument("--raw", type=Path, default=Path("../shared/data/emps"))
+    parser = parser_of(__doc__, Path("../shared/data/emps"))
     parser.add_argument("--pulses", choices=get_args(Pulses), default="known")
     args = parser.parse_args()
     convert(args.out, args.raw, args.pulses)

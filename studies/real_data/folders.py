@@ -1,5 +1,6 @@
 """Data sets of recordings made elsewhere: what their converters share."""
 
+import argparse
 import hashlib
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -101,6 +102,21 @@ def arm_of_motors(name: str, joints: Sequence[str], bodies: str, gravity: float 
 def hashes_of(raw: Mapping[str, Path]) -> dict[str, str]:
     """Return the SHA-256 of the files that recordings were taken from, for the record."""
     return {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in raw.items()}
+
+
+def parser_of(about: str | None, raw: Path | None = None) -> argparse.ArgumentParser:
+    """Return what every converter is told: where to write, and where the recordings lie.
+
+    Args:
+        about: the converter's docstring.
+        raw: where they lie unless it is said; None where it must be.
+    """
+    parser = argparse.ArgumentParser(description=about)
+    parser.add_argument("out", type=Path, help="the new folder")
+    parser.add_argument(
+        "--raw", type=Path, default=raw, required=raw is None, help="where the recordings lie"
+    )
+    return parser
 
 
 def there(folder: Path, name: str) -> Path:

@@ -8,13 +8,12 @@ scales and rulers (``bench.yaml``); of the servo the file has stand-ins.
 Run ``python -m studies.real_data.mx106 OUT --raw FOLDER``.
 """
 
-import argparse
 from pathlib import Path
 
 import numpy as np
 
 from shared.identification.dataset.types import Split, Trajectory
-from studies.real_data.folders import hashes_of, there, write
+from studies.real_data.folders import hashes_of, parser_of, there, write
 
 JOINT = "pivot"
 MOTIONS: dict[str, tuple[Split, float, float]] = {
@@ -75,9 +74,7 @@ def _read(name: str, path: Path) -> Trajectory:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", type=Path, help="the new folder")
-    parser.add_argument("--raw", type=Path, required=True, help="where the recordings lie")
+    parser = parser_of(__doc__)
     parser.add_argument("--kp", type=float, default=40.0, help="of the model (40 N m/rad)")
     parser.add_argument("--damping", type=float, default=0.5, help="(0.5 N m s/rad)")
     parser.add_argument("--friction", type=float, default=0.1, help="(0.1 N m)")

@@ -9,13 +9,12 @@ of 1 stand for a controller; no joint rubs.
 Run ``python -m studies.real_data.panda OUT --raw FOLDER``.
 """
 
-import argparse
 from pathlib import Path
 
 import numpy as np
 
 from shared.identification.dataset.types import Float64
-from studies.real_data.folders import arm_of_motors, hashes_of, in_parts, there, write
+from studies.real_data.folders import arm_of_motors, hashes_of, in_parts, parser_of, there, write
 
 JOINTS = tuple(f"joint{number}" for number in range(1, 8))
 FILES = {name: f"exciting_traj_{name}.txt" for name in ("time", "positions", "torques")}
@@ -70,9 +69,7 @@ def _model() -> str:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", type=Path, help="the new folder")
-    parser.add_argument("--raw", type=Path, required=True, help="where the recordings lie")
+    parser = parser_of(__doc__)
     parser.add_argument("--seconds", type=float, default=15.0, help="so much of them (15)")
     parser.add_argument("--every", type=int, default=5, help="of so many readings one (5)")
     args = parser.parse_args()

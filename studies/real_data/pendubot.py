@@ -8,13 +8,12 @@ construction drawings (``planar_manip.urdf``): nothing rubs, and the motor has n
 Run ``python -m studies.real_data.pendubot OUT --raw FOLDER``.
 """
 
-import argparse
 from pathlib import Path
 
 import numpy as np
 
 from shared.identification.dataset.types import Float64
-from studies.real_data.folders import arm_of_motors, hashes_of, in_parts, there, write
+from studies.real_data.folders import arm_of_motors, hashes_of, in_parts, parser_of, there, write
 
 JOINTS = ("shoulder", "elbow")
 DRIVEN = JOINTS[:1]
@@ -56,9 +55,7 @@ def convert(out: Path, raw: Path, seconds: float = 12.0, parts: int = 6) -> None
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", type=Path, help="the new folder")
-    parser.add_argument("--raw", type=Path, required=True, help="where the recording lies")
+    parser = parser_of(__doc__)
     parser.add_argument("--seconds", type=float, default=12.0, help="so much of it (12)")
     args = parser.parse_args()
     convert(args.out, args.raw, args.seconds)

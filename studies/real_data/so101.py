@@ -7,7 +7,6 @@ Recordings of github.com/isaac-sim2real/sage (``output/real/so101/custom``): 50 
 Run ``python -m studies.real_data.so101 OUT --raw FOLDER``.
 """
 
-import argparse
 import csv
 import json
 from collections.abc import Sequence
@@ -16,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from shared.identification.dataset.types import Float64, Split, Trajectory
-from studies.real_data.folders import hashes_of, there, write
+from studies.real_data.folders import hashes_of, parser_of, there, write
 
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
 TRAIN = ("prbs_excitation", "multisine", "chirp_sweep")
@@ -113,9 +112,7 @@ def _table(path: Path) -> Float64:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", type=Path, help="the new folder")
-    parser.add_argument("--raw", type=Path, required=True, help="where the recordings lie")
+    parser = parser_of(__doc__)
     parser.add_argument("--seconds", type=float, default=11.0, help="so much of each (11)")
     for name, motions in (("train", TRAIN), ("test", TEST)):
         parser.add_argument(

@@ -10,14 +10,13 @@ Run ``pip download figaroh==1.0.2 --no-deps --no-binary figaroh`` and unpack tha
 ``python -m studies.real_data.tiago OUT --raw figaroh-1.0.2/tests/fixtures/tiago/data``.
 """
 
-import argparse
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
-from studies.real_data.folders import hashes_of, in_parts, there, write
+from studies.real_data.folders import hashes_of, in_parts, parser_of, there, write
 
 JOINTS = tuple(f"arm_{number}_joint" for number in range(1, 8))
 FILES = ("tiago_position.csv", "tiago_effort.csv")
@@ -94,9 +93,7 @@ def _way(link: str, above: dict[str, str]) -> list[str]:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", type=Path, help="the new folder")
-    parser.add_argument("--raw", type=Path, required=True, help="where the recordings lie")
+    parser = parser_of(__doc__)
     parser.add_argument("--parts", type=int, default=6, help="recordings that they become (6)")
     args = parser.parse_args()
     convert(args.out, args.raw, args.parts)

@@ -12,14 +12,13 @@ off the recordings: a regression leaves 8 units of its current then, and 28 othe
 Run ``python -m studies.real_data.two_links OUT --raw FOLDER``.
 """
 
-import argparse
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from shared.identification.dataset.types import Float64, Trajectory
-from studies.real_data.folders import arm_of_motors, hashes_of, in_parts, there, write
+from studies.real_data.folders import arm_of_motors, hashes_of, in_parts, parser_of, there, write
 
 JOINTS = ("shoulder", "elbow")
 FILES = ("two_link_observer_05_norm.csv", "two_link_observer_05_fast.csv")
@@ -77,9 +76,7 @@ def _parts(name: str, table: Float64, begin: float, seconds: float) -> list[Traj
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", type=Path, help="the new folder")
-    parser.add_argument("--raw", type=Path, required=True, help="where the recordings lie")
+    parser = parser_of(__doc__)
     parser.add_argument("--begin", type=float, default=11.3, help="from when on (11.3 s)")
     parser.add_argument("--seconds", type=float, default=3.57, help="so much of each (3.57)")
     args = parser.parse_args()

@@ -9,14 +9,13 @@ and masses as MuJoCo Menagerie's ``universal_robots_ur10e`` has them; what it sa
 Run ``python -m studies.real_data.ur10e OUT --raw FOLDER --train FILE --test FILE``.
 """
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from shared.identification.dataset.types import Float64, Split, Trajectory
-from studies.real_data.folders import arm_of_motors, hashes_of, recording, there, write
+from studies.real_data.folders import arm_of_motors, hashes_of, parser_of, recording, there, write
 
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 GAINS = np.array([14.87, 13.26, 11.13, 10.62, 11.03, 11.47])
@@ -85,9 +84,7 @@ def _model(damping: float) -> str:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", type=Path, help="the new folder")
-    parser.add_argument("--raw", type=Path, required=True, help="where the recordings lie")
+    parser = parser_of(__doc__)
     parser.add_argument("--train", nargs="+", required=True, metavar="FILE[:FIRST[:LAST]]")
     parser.add_argument("--test", nargs="+", required=True, metavar="FILE[:FIRST[:LAST]]")
     parser.add_argument("--damping", type=float, default=10.0, help="of the model (N m s/rad)")
