@@ -283,6 +283,7 @@ def _verdict(
         held_out=conclusion.held_out,
         candidates=conclusion.candidates,
         ruled_out=found.ruled_out,
+        limits=conclusion.limits,
         base=conclusion.base,
         caveats=(
             *_uncounted(found),

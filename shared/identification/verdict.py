@@ -6,6 +6,9 @@ import msgspec
 
 SCHEMA = 1
 """Of ``verdict.json``."""
+NAMED_SHARE = 0.1
+"""Of what a model leaves without an effect: what the effect takes off where it is named nine times
+of ten (docs/identify_results.md)."""
 Word = Literal["named", "none", "tie", "base_too_coarse", "unexplained"]
 
 
@@ -121,6 +124,19 @@ class Scored(_Part, frozen=True, kw_only=True):
     """In words, of those that were not named."""
 
 
+class Limit(_Part, frozen=True, kw_only=True):
+    """From which size on an effect that was not named would have been, nine times of ten."""
+
+    effect: str
+    title: str
+    """In words."""
+    where: str
+    quantity: str
+    size: float | None
+    """Either way; None where these recordings would not have shown any size that is looked for."""
+    unit: str
+
+
 class BaseValue(_Part, frozen=True, kw_only=True):
     """A parameter of the base model before and after."""
 
@@ -149,6 +165,9 @@ class Verdict(_Part, frozen=True, kw_only=True):
     """Best first."""
     ruled_out: dict[str, str]
     """Effects that could not be looked for, and why."""
+    limits: tuple[Limit, ...] = ()
+    """What the recordings would have shown of the other effects, by effect and place; empty where
+    more is left than noise, and in older verdicts."""
     base: tuple[BaseValue, ...]
     caveats: tuple[str, ...]
     record_next: tuple[str, ...]

@@ -42,14 +42,13 @@ class Bar:
 
     name: str
     ratios: Sequence[float]
-    """Of each place (1)."""
+    """Of each place: the size looked at by that from which on it is named (1)."""
     is_visible: bool
 
 
 def programme_picture(
-    stretches: Sequence[Stretch], columns: Sequence[str], label: str, bars: Sequence[Bar],
-    visible: float,
-) -> bytes:  # fmt: skip
+    stretches: Sequence[Stretch], columns: Sequence[str], label: str, bars: Sequence[Bar]
+) -> bytes:
     """Return a PNG.
 
     Args:
@@ -57,7 +56,6 @@ def programme_picture(
         columns: names of the commands' columns that are drawn, from the first.
         label: of the commands, with their unit.
         bars: the effects.
-        visible: ratio from which an effect is seen (1).
     """
     with mpl.rc_context(_STYLE):
         height = 3.4 + 0.19 * len(bars)
@@ -87,13 +85,15 @@ def programme_picture(
             colour = _SEEN if bar.is_visible else _UNSEEN
             under.plot([ratios.min(), ratios.max()], [row, row], color=colour, linewidth=2.5)
             under.plot(ratios, np.full(len(ratios), row), "o", color=colour, markersize=3.5)
-        under.axvline(visible, color=_UNSEEN, linewidth=0.9, linestyle=(0, (4, 3)))
+        under.axvline(1.0, color=_UNSEEN, linewidth=0.9, linestyle=(0, (4, 3)))
         under.set_xscale("log")
         under.xaxis.set_major_formatter(FuncFormatter(_plain))
         under.xaxis.set_minor_formatter(NullFormatter())
         under.set_yticks(range(len(bars)), [bar.name.replace("_", " ") for bar in bars])
         under.set_ylim(len(bars) - 0.4, -0.6)
-        under.set_xlabel("signal to noise, a dot for each place; seen to the right of the line")
+        under.set_xlabel(
+            "a size that matters, over the smallest that would be named; a dot for each place"
+        )
         data = io.BytesIO()
         figure.savefig(data, format="png", dpi=110, metadata={"Software": None})
         return data.getvalue()

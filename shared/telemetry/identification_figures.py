@@ -173,8 +173,9 @@ def motion(at: Floats, measured: Floats, predicted: Mapping[str, Floats], y_labe
 
 
 def residual_over_time(
-    at: Floats, residuals: Mapping[str, Floats], noise: float | None, y_label: str
-) -> str:
+    at: Floats, residuals: Mapping[str, Floats], noise: float | None, y_label: str,
+    *, is_distance: bool = False,
+) -> str:  # fmt: skip
     """Return what each stage leaves over, the noise floor as a band of two standard deviations.
 
     Args:
@@ -182,12 +183,13 @@ def residual_over_time(
         residuals: float64[T] each, by stage.
         noise: root mean square, of the same unit; None: not drawn.
         y_label: with the unit.
+        is_distance: whether none can be below 0.
     """
     with mpl.rc_context(STYLE):
         figure, axes = panel(2.7)
         if noise is not None:
-            axes.axhspan(-2 * noise, 2 * noise, color=SOFT, alpha=0.18, linewidth=0,
-                         label="noise")  # fmt: skip
+            low = 0.0 if is_distance else -2 * noise
+            axes.axhspan(low, 2 * noise, color=SOFT, alpha=0.18, linewidth=0, label="noise")
         axes.axhline(0.0, color=SOFT, linewidth=0.7)
         step = _step(at)
         for stage, values in residuals.items():

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from services.jobs.identify import pictures, words
 from services.jobs.identify.pictures import Picture
 from shared.identification.conclusion.evidence import Evidence
-from shared.identification.verdict import Scored, Tie, Verdict
+from shared.identification.verdict import NAMED_SHARE, Limit, Scored, Tie, Verdict
 from shared.telemetry import html
 from shared.telemetry.html import Html, Node, tag
 
@@ -79,6 +79,50 @@ def candidates(verdict: Verdict) -> Html:
             html.table(("effect", "why"), ruled),
         ) if ruled else None,
     )  # fmt: skip
+
+
+def limits(verdict: Verdict) -> Html | None:
+    """Return from which size on the effects that were not named would have been."""
+    if not verdict.limits:
+        return None
+    effects: dict[str, list[Limit]] = {}
+    for each in verdict.limits:
+        effects.setdefault(each.effect, []).append(each)
+    headers = ("effect", "where it shows most", "where it shows least", "nowhere to be seen at")
+    rows = [_limits(each) for each in effects.values()]
+    if not any(each.size is None for each in verdict.limits):
+        headers, rows = headers[:-1], [row[:-1] for row in rows]
+    about = (
+        f"Smallest sizes that would take {NAMED_SHARE:.0%} off what is left, which is named nine "
+        "times of ten; half of them every second time. What the base model can make up for does "
+        "not count."
+    )
+    table = html.table(headers, rows, caption=about)
+    return html.section(
+        "What else would have been named" if verdict.causes else "What would have been named",
+        table
+        if verdict.verdict == "none"
+        else html.details(f"From which size on, {len(effects)} effects", table),
+    )
+
+
+def _limits(alike: Sequence[Limit]) -> tuple[Node, ...]:
+    """Return a row of one effect: where it would show most and least, and where not."""
+    seen = sorted(
+        (each for each in alike if each.size is not None), key=lambda each: each.size or 0.0
+    )
+    unseen = [words.where_text(each.where) for each in alike if each.size is None]
+    return (
+        tag("b", alike[0].title),
+        _limit(seen[0]) if seen else "at no size",
+        _limit(seen[-1]) if len(seen) > 1 else "",
+        ", ".join(unseen) if seen else "",
+    )
+
+
+def _limit(limit: Limit) -> str:
+    where = f" ({limit.where})" if limit.where else ""
+    return f"{words.limit_text(limit)}{where}"
 
 
 def _reasons(verdict: Verdict) -> Node:

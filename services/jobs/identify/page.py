@@ -49,6 +49,7 @@ def report_page(verdict: Verdict, evidence: Evidence, about: About) -> str:
         considered.record_next(verdict),
         _held_out(verdict, evidence),
         considered.candidates(verdict),
+        considered.limits(verdict),
         considered.unexplained(verdict, evidence),
         _diagnostics(evidence),
         _base(verdict),

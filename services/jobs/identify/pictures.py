@@ -56,7 +56,7 @@ def stages(verdict: Verdict) -> Picture:
     values = {"nominal": held_out.nominal, "base_fit": held_out.base_fit}
     if "extended" in stages_of(verdict):
         values["extended"] = held_out.extended
-    best = "1 is as good as it gets" if held_out.is_floor_measured else floor_text(held_out)
+    best = "A right model leaves about 1" if held_out.is_floor_measured else floor_text(held_out)
     words = f"Root-mean-square residual on motion that nothing was fitted to. {best}."
     return Picture(figures.stages_against_noise(values, floor_name(held_out)), words)
 
@@ -122,7 +122,7 @@ def tracker(window: Window, verdict: Verdict, evidence: Evidence) -> Picture | N
     noise = None if evidence.tracker_noise is None else 1e3 * evidence.tracker_noise[0]
     stages = stages_of(verdict)
     residuals = {str(k): 1e3 * values[inside] for k, values in off.items() if k in stages}
-    svg = figures.residual_over_time(at[inside], residuals, noise, "tracker (mm)")
+    svg = figures.residual_over_time(at[inside], residuals, noise, "tracker (mm)", is_distance=True)
     return Picture(svg, "How far the tracker is from where each stage expects it, same stretch.")
 
 

@@ -1,11 +1,20 @@
 """A verdict in words: numbers with units, and the lines that `riposte identify` ends with."""
 
+import math
 import textwrap
 from pathlib import Path
 
 from shared.identification.conclusion.sentence import as_told
-from shared.identification.verdict import Cause, HeldOut, Interval, Tie, Unexplained, Verdict
-from shared.telemetry.wording import scaled
+from shared.identification.verdict import (
+    Cause,
+    HeldOut,
+    Interval,
+    Limit,
+    Tie,
+    Unexplained,
+    Verdict,
+)
+from shared.telemetry.wording import listing, scaled
 
 WIDTH = 88
 LISTED = 3
@@ -76,6 +85,26 @@ def size_text(cause: Cause) -> str:
     """Return what says how large a cause is, with its 95 % interval: ``delay 30 ms (29 to 31)``."""
     told = as_told(cause)
     return f"{told.quantity} {quantity_text(told.value, told.unit, told.interval)}"
+
+
+def limit_text(limit: Limit) -> str:
+    """Return from which size on an effect would have been named, as its size is told."""
+    if limit.size is None:
+        return "at no size"
+    name = limit.quantity.removeprefix("inverse_")
+    which = "from" if name == limit.quantity else "up to"
+    name = "amplitude" if name == "cosine" else name.replace("_", " ")
+    return f"{name} {which} {sizes_text(limit.quantity, limit.unit, limit.size)}"
+
+
+def sizes_text(quantity: str, unit: str, *sizes: float) -> str:
+    """Return sizes as they are told, with one unit that fits them all: ``3 to 40 mrad``."""
+    if quantity.startswith("inverse_"):
+        unit = unit.removeprefix("1/").strip("()")
+        sizes = tuple(1.0 / each for each in sizes)
+    shown, factor = scaled(unit, *(each for each in sizes if math.isfinite(each)))
+    texts = [number_text(factor * each, 2) for each in sizes]
+    return f"{' to '.join(texts)} {shown}".strip()
 
 
 def share_text(share: float, interval: Interval | None = None) -> str:
@@ -149,6 +178,18 @@ def _listed(texts: list[str], most: int) -> list[str]:
     return [*texts[:most], f"and {more} more, in the report"] if more > 0 else texts
 
 
+def _limit_texts(verdict: Verdict) -> list[str]:
+    """Return in a line what of the whole arm would have been named, where nothing was."""
+    if verdict.verdict != "none":
+        return []
+    shown = [
+        f"{each.effect.replace('_', ' ')} ({limit_text(each)})"
+        for each in verdict.limits
+        if not each.where and each.size is not None
+    ]
+    return [f"{listing(shown)}; of each joint in the report"] if shown else []
+
+
 def when_text(left: Unexplained) -> str:
     """Return when something is left, and whether it came from outside."""
     return f"external, {left.phase}" if left.is_external else left.phase
@@ -177,6 +218,7 @@ def verdict_text(verdict: Verdict, folder: Path) -> str:
         share = share_text(verdict.held_out.share_removed, verdict.held_out.share_interval)
         add("", [f"removes {share} of what could be explained"])
     add("unexplained", _unexplained_texts(verdict))
+    add("would show", _limit_texts(verdict))
     add("record next", list(verdict.record_next[:3]))
     add("beware", _warnings(verdict))
     add("report", [str(folder / "report.html")])

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shared.identification.conclusion.causes import causes_of, ties_of
+from shared.identification.conclusion.limits import limits_of
 from shared.identification.conclusion.sentence import sentence_of, with_far
 from shared.identification.dataset.types import Float64
 from shared.identification.fitting.problem import Variant
@@ -18,6 +19,7 @@ from shared.identification.verdict import (
     Cause,
     HeldOut,
     Interval,
+    Limit,
     Scored,
     Tie,
     Unexplained,
@@ -38,6 +40,8 @@ class Conclusion:
     ties: tuple[Tie, ...]
     held_out: HeldOut
     candidates: tuple[Scored, ...]
+    limits: tuple[Limit, ...]
+    """From which size on the others would have been named; none where more is left than noise."""
     base: tuple[BaseValue, ...]
     far: str
     """What of the base is surely far from the model file, in words; empty if nothing."""
@@ -66,6 +70,7 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
         ties=ties if word == "tie" else (),
         held_out=held_out,
         candidates=_scored(found, word),
+        limits=limits_of(found) if word in ("named", "none", "tie") else (),
         base=_base(found, widths),
         far=far,
     )

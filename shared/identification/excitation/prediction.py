@@ -2,8 +2,9 @@
 
 Each effect is put into the nominal arm at a size that matters to it, the recordings are simulated,
 and what the base parameters could absorb is taken out of the difference. What is left, in standard
-deviations of the noise floor and over all training recordings, is its signal-to-noise ratio; two
-effects whose differences point the same way cannot be told apart.
+deviations of the noise floor and over all training recordings, is its signal-to-noise ratio. It is
+seen where that is a tenth of all that is left then, noise and effect, which is from where on
+nine of ten are named; two effects whose differences point the same way cannot be told apart.
 """
 
 from collections.abc import Sequence
@@ -21,14 +22,13 @@ from shared.identification.fitting.parameters import base_parameters
 from shared.identification.fitting.problem import Problem, Variant
 from shared.identification.fitting.space import Space
 from shared.identification.noise.floor import Noise
+from shared.identification.verdict import NAMED_SHARE
 from shared.sim.plant.plant import pr2
 from shared.sim.plant.replay import Recorded
 from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal
 
-VISIBLE: Final = 5.0
-"""Signal-to-noise ratio from which an effect is seen."""
 ALIKE: Final = 0.9
 """Cosine from which two effects are confused."""
 _CAPACITY: Final = 160
@@ -54,21 +54,23 @@ class Power:
 
     effect: str
     place: str
+    quantity: str
+    """Its first number."""
     size: float
-    """At which it was looked at: of its first number."""
+    """At which it was looked at, of that."""
     unit: str
     ratio: float
     """Signal to noise, of its best seen number (1)."""
+    named_from: float
+    """Size of that from which on it is named nine times of ten, if it shows by its
+    size; infinite if that does not show at all."""
+    is_visible: bool
+    """Whether it stands out: at the size looked at any of its numbers is named."""
 
     @property
     def label(self) -> str:
         """Return effect and place."""
         return f"{self.effect} {self.place}".strip()
-
-    @property
-    def is_visible(self) -> bool:
-        """Whether it stands out."""
-        return self.ratio >= VISIBLE
 
 
 @dataclass(frozen=True)
@@ -181,9 +183,12 @@ def predict(dataset: Dataset, noise: Noise, effects: Sequence[Effect]) -> Predic
     # Neighbouring blocks that are correlated count for less.
     rho = float(np.mean(noise.correlation))
     ratios = np.linalg.norm(bare, axis=0) * np.sqrt((1.0 - rho) / (1.0 + rho))
+    # Of as much noise as there are numbers, as correlated as what is seen.
+    noise_ratio = np.sqrt(found.shape[1] * (1.0 - rho) / (1.0 + rho))
+    wanted = float(noise_ratio * np.sqrt(NAMED_SHARE / (1.0 - NAMED_SHARE)))
     powers = [
         _power(subject, candidate, [ratios[column] for column, owner in enumerate(owners)
-                                    if owner == index])
+                                    if owner == index], wanted)
         for index, candidate in enumerate(candidates)
     ]  # fmt: skip
     outlooks = tuple(
@@ -226,10 +231,41 @@ def _looks(subject: Subject, candidate: Candidate) -> list[Float64]:
     return out
 
 
-def _power(subject: Subject, candidate: Candidate, ratios: Sequence[float]) -> Power:
-    first = candidate.effect.quantities(subject, candidate.place)[0]
-    size = float(_looks(subject, candidate)[0][0])
-    return Power(candidate.effect.name, candidate.place, size, first.unit, float(max(ratios)))
+def _power(subject: Subject, candidate: Candidate, ratios: Sequence[float], wanted: float) -> Power:
+    """Return how well a candidate is seen.
+
+    Args:
+        subject: the arm.
+        candidate: the effect at its place.
+        ratios: signal to noise of each of its numbers.
+        wanted: signal to noise from which on it is named.
+    """
+    quantities = candidate.effect.quantities(subject, candidate.place)
+    first = quantities[0]
+    size, own = float(_looks(subject, candidate)[0][0]), float(ratios[0])
+    return Power(
+        effect=candidate.effect.name,
+        place=candidate.place,
+        quantity=first.name,
+        size=size,
+        unit=first.unit,
+        ratio=float(max(ratios)),
+        named_from=_named_from(size, own / wanted, is_level=all(each.grid for each in quantities)),
+        is_visible=float(max(ratios)) >= wanted,
+    )
+
+
+def _named_from(size: float, share: float, *, is_level: bool) -> float:
+    """Return the size from which on an effect is named.
+
+    Args:
+        size: at which it was looked at.
+        share: of what it takes to be named, which it shows at that size.
+        is_level: whether it acts from some size on: of others nothing is known.
+    """
+    if is_level:
+        return size if share >= 1.0 else np.inf
+    return size / share if share > 0.0 else np.inf
 
 
 def _probes(

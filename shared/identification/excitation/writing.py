@@ -133,6 +133,7 @@ def _programme(
                         "size": power.size,
                         "unit": power.unit,
                         "signal_to_noise": round(power.ratio, 3),
+                        "named_from": float(f"{power.named_from:.3g}"),
                     }
                     for power in outlook.powers
                 ],

@@ -263,7 +263,7 @@ def _base_cause(other: Otherwise) -> Cause:
         where=place,
         quantity=f"{word} factor",
         value=value,
-        unit="1",
+        unit="",
         interval=Interval(low=low, high=high),
         title="gains, damping, armature or friction are far from the model file's",
         signature="The base fit explains the motion by itself, with numbers far from the file's.",

@@ -115,6 +115,16 @@ def test_every_candidate_is_there_with_its_scores_and_why_not() -> None:
         assert [effect, why] in page.rows
 
 
+def test_what_would_have_been_named_is_there_with_where_it_shows_least() -> None:
+    rows = page_of("none").rows
+    assert ["the tool is heavier than the model says", "mass from 34 g", "", ""] in rows
+    gain = ["the drive gives another torque", "share from 21 % (elbow_flex)", "", "wrist_roll"]
+    assert gain in rows
+    assert "What would have been named" in page_of("none").text
+    assert "What else would have been named" in page_of("named").text
+    assert "have been named" not in page_of("unexplained").text
+
+
 def test_what_is_unexplained_is_located() -> None:
     found, page = example("unexplained"), page_of("unexplained")
     for number, left in enumerate(found.verdict.unexplained):

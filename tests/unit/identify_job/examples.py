@@ -15,6 +15,7 @@ from shared.identification.verdict import (
     Cause,
     HeldOut,
     Interval,
+    Limit,
     Scored,
     Tie,
     Unexplained,
@@ -176,6 +177,16 @@ CANDIDATES = (
 )
 
 
+LIMITS = (
+    Limit(effect="payload", title="the tool is heavier than the model says", where="",
+          quantity="mass", size=0.034, unit="kg"),
+    Limit(effect="torque_gain", title="the drive gives another torque", where="wrist_roll",
+          quantity="share", size=None, unit="1"),
+    Limit(effect="torque_gain", title="the drive gives another torque", where="elbow_flex",
+          quantity="share", size=0.21, unit="1"),
+)  # fmt: skip
+
+
 def _base(*, is_bent: bool) -> tuple[BaseValue, ...]:
     rng = np.random.default_rng(4)
     rows: list[BaseValue] = []
@@ -201,6 +212,7 @@ def _verdict(
         verdict=word, sentence=sentence, causes=causes, ties=ties, unexplained=unexplained,
         held_out=held_out, candidates=candidates,
         ruled_out={"gravity_tilt": "the model has no gravity", "clock_skew": "under 60 s long"},
+        limits=() if word in ("unexplained", "base_too_coarse") else LIMITS,
         base=_base(is_bent=bool(causes)),
         caveats=("joints are logged 100 times a second; fast effects need more",
                  "no recording is with other gains or another load"),

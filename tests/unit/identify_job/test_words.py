@@ -8,6 +8,7 @@ import pytest
 from services.jobs.identify.words import (
     cause_text,
     held_out_text,
+    limit_text,
     moment_text,
     number_text,
     quantity_text,
@@ -17,7 +18,7 @@ from services.jobs.identify.words import (
     verdict_text,
 )
 from shared.identification.conclusion.sentence import as_told, sentence_of
-from shared.identification.verdict import Cause, Interval
+from shared.identification.verdict import Cause, Interval, Limit
 from tests.unit.identify_job.examples import WORDS, example
 
 
@@ -29,7 +30,11 @@ from tests.unit.identify_job.examples import WORDS, example
         (-0.0021, "m", "\N{MINUS SIGN}2.1 mm"),
         (0.05, "rad", "50 mrad"),
         (0.612, "N m", "0.612 N m"),
-        (0.25, "1", "0.25"),
+        (0.25, "1", "25 %"),
+        (0.034, "kg", "34 g"),
+        (0.00028, "rad/(N m)", "0.28 mrad/(N m)"),
+        (0.5, "rad/(N m)", "0.5 rad/(N m)"),
+        (2.17, "", "2.17"),
         (0.00012, "kg m^2", "0.00012 kg m^2"),
         (0.0, "s", "0 s"),
     ],
@@ -60,6 +65,30 @@ def test_a_limit_sought_as_one_over_it_is_told_as_a_limit() -> None:
     told = [sentence_of("named", (_limited(low),), (), held_out, ()) for low in (0.2, -0.01)]
     assert "weak at elbow (limit 4 ± 2 N m)." in told[0]
     assert "weak at elbow (limit 4 N m, at least 2)." in told[1]
+
+
+@pytest.mark.parametrize(
+    ("quantity", "size", "unit", "text"),
+    [
+        ("mass", 0.034, "kg", "mass from 34 g"),
+        ("half_difference", 0.0671, "N m s/rad", "half difference from 0.067 N m s/rad"),
+        ("inverse_limit", 0.25, "1/(N m)", "limit up to 4 N m"),
+        ("cosine", 0.2, "N m", "amplitude from 0.2 N m"),
+        ("share", None, "1", "at no size"),
+    ],
+)
+def test_a_limit_of_detection_is_told_as_its_cause_would_be(
+    quantity: str, size: float | None, unit: str, text: str
+) -> None:
+    limit = Limit(effect="e", title="t", where="elbow", quantity=quantity, size=size, unit=unit)
+    assert limit_text(limit) == text
+
+
+def test_where_nothing_is_named_the_screen_says_what_would_have_been() -> None:
+    none = example("none").verdict
+    told = " ".join(verdict_text(none, Path("out")).split())
+    assert "would show payload (mass from 34 g); of each joint in the report" in told
+    assert "would show" not in verdict_text(example("named").verdict, Path("out"))
 
 
 def test_a_ripple_is_told_by_its_amplitude() -> None:

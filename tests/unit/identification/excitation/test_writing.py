@@ -70,7 +70,7 @@ def test_a_programme_that_shows_too_little_is_refused_and_not_written(
     path = write_arm(tmp_path)
     path.write_text(path.read_text().replace('timestep="0.002"', 'timestep="0.005"'))
     out = tmp_path / "out"
-    words = [str(path), "--out", str(out), "--seconds", "40", "--joint-speed", "0.3"]
+    words = [str(path), "--out", str(out), "--seconds", "40", "--joint-speed", "1.5"]
     assert excite.run(arguments(*words, "--require", "1.0")) == 2
     said = capsys.readouterr().out
     assert "refused" in said
