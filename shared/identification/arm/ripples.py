@@ -32,7 +32,7 @@ _BESIDE = 1 / 3
 """Of the strongest one's power that another must have: a strong line leaks into all others."""
 _COUNTS = np.arange(FEWEST, MOST, 0.125)
 """Ripples in the whole travel that are looked at."""
-_RANK = 1e-8
+RANK = 1e-8
 """Of the largest singular value: what is less is nothing."""
 _INSTANTS = 4000
 """Looked at, of all recordings together."""
@@ -94,37 +94,43 @@ def _strongest(motion: _Motion, joint: int) -> tuple[float, ...]:
     off = (q - q.mean()) / travel
     ways = (off, off**2, off**3, np.tanh(qd / (0.1 * speed)), qd, np.abs(qd), motion.qdd[:, joint])
     own = np.stack([np.ones_like(q), *ways], axis=1)
-    found = _seen(own, torque, off, np.asarray, ())
+    found = lines(own, torque, off, np.asarray, ())
     if len(found) > 1:  # none of them is clear
         given = motion.given[:, [joint]]
         postures = np.sin(motion.q), np.cos(motion.q)
         others = np.concatenate([own, given, motion.qd, motion.qdd, *postures], axis=1)
-        left = without(basis_of(others, _RANK), torque[:, None])[:, 0]
-        found += _seen(others, torque, off, _whitening(left, motion.is_first), found)
+        left = without(basis_of(others, RANK), torque[:, None])[:, 0]
+        found += lines(others, torque, off, whitening(left, motion.is_first), found)
     return tuple(count / travel for count in found)
 
 
-def _seen(
-    rest: Float64, torque: Float64, off: Float64, white: Callable[[Float64], Float64],
-    known: Sequence[float],
+def lines(
+    rest: Float64, signal: Float64, off: Float64, white: Callable[[Float64], Float64],
+    known: Sequence[float], clear: float = 0.0, ways: Sequence[Float64] = (),
 ) -> list[float]:  # fmt: skip
     """Return the strongest few ripples in the travel that are not known, the strongest first.
 
     Args:
-        rest: float64[N, K], what else a torque may be a sum of.
-        torque: float64[N].
+        rest: float64[N, K], what else a signal may be a sum of.
+        signal: float64[N], a torque, or what follows from it.
         off: float64[N], places in the travel (1).
         white: what both and ripples are seen through.
         known: ripples that are.
+        clear: power that one must have, in mean squares of what the rest leaves.
+        ways: float64[N] each, what ripples may come with beside themselves: the way the joint went.
     """
-    basis = basis_of(white(rest), _RANK)
-    left = without(basis, white(torque[:, None]))[:, 0]
+    basis = basis_of(white(rest), RANK)
+    left = without(basis, white(signal[:, None]))[:, 0]
+    clear *= float(np.mean(left**2))
     phases = (2.0 * np.pi * count * off for count in _COUNTS)
-    waves = (np.stack([np.cos(phase), np.sin(phase)], axis=1) for phase in phases)
+    plain = (np.stack([np.cos(phase), np.sin(phase)], axis=1) for phase in phases)
+    waves = (
+        np.concatenate([each, *(each * way[:, None] for way in ways)], axis=1) for each in plain
+    )
     powers = np.array([_power(left, without(basis, white(each))) for each in waves])
     found: list[float] = []
     for index in np.argsort(-powers):
-        if powers[index] < _BESIDE * powers.max() or len(found) == KEPT:
+        if powers[index] < max(_BESIDE * powers.max(), clear) or len(found) == KEPT:
             break
         count = float(_COUNTS[index])
         if all(abs(count - other) > _APART for other in (*known, *found)):
@@ -132,7 +138,7 @@ def _seen(
     return found
 
 
-def _whitening(left: Float64, is_first: NDArray[np.bool_]) -> Callable[[Float64], Float64]:
+def whitening(left: Float64, is_first: NDArray[np.bool_]) -> Callable[[Float64], Float64]:
     """Return what takes off a signal, float64[N, K], what the instant before says of it.
 
     Args:
@@ -149,6 +155,6 @@ def _whitening(left: Float64, is_first: NDArray[np.bool_]) -> Callable[[Float64]
 
 
 def _power(left: Float64, waves: Float64) -> float:
-    """Return how much of the power of float64[N] two waves, float64[N, 2], take off."""
+    """Return how much of the power of float64[N] a few waves, float64[N, W], take off."""
     along = waves.T @ left
     return float(along @ np.linalg.pinv(waves.T @ waves) @ along)

@@ -231,6 +231,10 @@ class Problem:
             rows, channels = min(rows, len(of_tracker.starts)), channels + len(self.noise.tracker)
         return rows, channels
 
+    def positions(self, segment: int) -> Float64:
+        """Return float64[B, J], where joints were in the blocks of a segment (rad, m)."""
+        return self._bins[segment][0].mean(self.segments[segment].q)[: self.shape_of(segment)[0]]
+
     def size_of(self, segment: int) -> int:
         """Return how many numbers of :meth:`vector` are a segment's."""
         return math.prod(self.shape_of(segment))

@@ -19,7 +19,7 @@ def by_stretch(problem: Problem, segments: tuple[int, ...]) -> list[Integers]:
     size = round(STRETCH / BLOCK)
     return [
         piece.ravel()
-        for _, indices in _indices(problem, segments)
+        for _, indices in parts_of(problem, segments)
         for piece in np.array_split(indices, max(len(indices) // size, 1))
     ]
 
@@ -33,13 +33,13 @@ def by_channel(problem: Problem, segments: tuple[int, ...]) -> list[Integers]:
     if problem.noise.tracker is None:
         return []
     out: dict[tuple[int, int], list[Integers]] = {}
-    for segment, indices in _indices(problem, segments):
+    for segment, indices in parts_of(problem, segments):
         for channel, column in enumerate(indices.T):
             out.setdefault((problem.segments[segment].trajectory, channel), []).append(column)
     return [np.concatenate(pieces) for pieces in out.values()]
 
 
-def _indices(problem: Problem, segments: tuple[int, ...]) -> Iterator[tuple[int, Integers]]:
+def parts_of(problem: Problem, segments: tuple[int, ...]) -> Iterator[tuple[int, Integers]]:
     """Yield each segment with where its residuals are in the vector: int64[B, C]."""
     begin = 0
     for segment in segments:

@@ -45,13 +45,24 @@ Columns = Mapping[Candidate, Sequence[Looked]]
 
 
 def looks_of(
-    subject: Subject, candidates: Sequence[Candidate]
-) -> dict[Candidate, tuple[Look, ...]]:
-    """Return where candidates are looked at: all combinations of forms, each at all scales."""
-    return {each: _looks(each.effect.quantities(subject, each.place)) for each in candidates}
+    subject: Subject, candidates: Sequence[Candidate],
+    more: Mapping[Candidate, Sequence[float]] | None = None,
+) -> dict[Candidate, tuple[Look, ...]]:  # fmt: skip
+    """Return where candidates are looked at: all combinations of forms, each at all scales.
+
+    Args:
+        subject: the arm.
+        candidates: which.
+        more: further values of the one form that a candidate has.
+    """
+    more = more or {}
+    return {
+        each: _looks(each.effect.quantities(subject, each.place), more.get(each, ()))
+        for each in candidates
+    }
 
 
-def _looks(quantities: Sequence[Quantity]) -> tuple[Look, ...]:
+def _looks(quantities: Sequence[Quantity], more: Sequence[float] = ()) -> tuple[Look, ...]:
     probes = np.array([each.probe for each in quantities])
     low, high = (np.array([getattr(each, end) for each in quantities]) for end in ("low", "high"))
     sizes = tuple(index for index, each in enumerate(quantities) if not each.grid)
@@ -65,7 +76,7 @@ def _looks(quantities: Sequence[Quantity]) -> tuple[Look, ...]:
         sizes, forms = (0,), forms[1:]
         scales = tuple(value / quantities[0].probe for value in quantities[0].grid)
     out: list[Look] = []
-    for grid in itertools.product(*(quantities[index].grid for index in forms)):
+    for grid in itertools.product(*((*quantities[index].grid, *more) for index in forms)):
         form = np.zeros(len(quantities))
         form[forms] = np.array(grid) / probes[forms]
         for scale in scales:

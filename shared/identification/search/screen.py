@@ -5,7 +5,7 @@ out, so that a latency that damping imitates does not count twice, and candidate
 imitates altogether do not count at all.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -21,6 +21,7 @@ from shared.identification.fitting.linear import bounded, least_squares
 from shared.identification.fitting.problem import Problem
 from shared.identification.fitting.turns import LATE
 from shared.identification.search.looks import Columns, Look, Looked, columns_of, looks_of
+from shared.identification.search.ripples import ripples_left
 
 _MANY = 8
 """Parts, at least, of which every second one shows what acts all the time well enough to be looked
@@ -107,10 +108,11 @@ def screen(
     steady = [each for each in lasting if is_steady(subject, each)]
     local = [each for each in lasting if not is_steady(subject, each)]
     part = fit.on(rows)
+    ripples = ripples_left(fit, steady, segments)
     if seen is not None and fit.is_near_noise:
-        steady = _once_more(part, steady, seen.steady, _AGAIN)
+        steady = _once_more(part, steady, seen.steady, _AGAIN, ripples)
         local = _once_more(fit, local, seen.local, _AGAIN_LOCAL)
-    columns = columns_of(part, looks_of(subject, steady), picked)
+    columns = columns_of(part, looks_of(subject, steady, ripples), picked)
     everywhere = columns_of(fit, looks_of(subject, local), segments)
     if seen is not None and not seen.steady:
         seen.steady, seen.local = columns, everywhere
@@ -130,8 +132,9 @@ def screen(
 
 
 def _once_more(
-    fit: Fit, candidates: Sequence[Candidate], columns: Columns, count: int
-) -> list[Candidate]:
+    fit: Fit, candidates: Sequence[Candidate], columns: Columns, count: int,
+    new: Collection[Candidate] = (),
+) -> list[Candidate]:  # fmt: skip
     """Return those that are worth another look; what they change is much as it was.
 
     Of commands that are taken now and then it is not: as soon as a delay is there they change.
@@ -141,12 +144,15 @@ def _once_more(
         candidates: which were looked at before.
         columns: how they changed the residual then.
         count: of those to look at again.
+        new: those of which now something else is to be looked at.
     """
     known = {each: columns[each] for each in candidates if each in columns}
     best = sorted(at_best(fit, known), key=lambda each: -each.screened.share)[:count]
     kept = {each.screened.candidate for each in best}
     return [
-        each for each in candidates if each in kept or each not in known or each.effect.name in LATE
+        each
+        for each in candidates
+        if each in kept or each in new or each not in known or each.effect.name in LATE
     ]
 
 
