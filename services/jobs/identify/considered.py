@@ -93,9 +93,8 @@ def limits(verdict: Verdict) -> Html | None:
     if not any(each.size is None for each in verdict.limits):
         headers, rows = headers[:-1], [row[:-1] for row in rows]
     about = (
-        f"Smallest sizes that would take {NAMED_SHARE:.0%} off what is left, which is named nine "
-        "times of ten; half of them every second time. What the base model can make up for does "
-        "not count."
+        f"Sizes that would take {NAMED_SHARE:.0%} off what is left, which is named nine times of "
+        "ten; smaller ones often, too. What the base model can make up for does not count."
     )
     table = html.table(headers, rows, caption=about)
     return html.section(

@@ -21,7 +21,7 @@ from shared.identification.verdict import NAMED_SHARE, Limit
 def limits_of(found: Search) -> tuple[Limit, ...]:
     """Return from which size on each effect would have been named, beside those that were.
 
-    Not of what happens once, a push or a tracker that slips: that depends on when.
+    Not of a push: that depends on when.
 
     Args:
         found: the search, over.

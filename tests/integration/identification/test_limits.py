@@ -24,7 +24,7 @@ def _limit(verdict: Verdict, effect: str, where: str = "") -> Limit:
 
 def test_every_effect_that_could_be_looked_for_has_a_limit(nothing: Verdict) -> None:
     assert nothing.verdict == "none"
-    lasting = {each.effect for each in nothing.candidates} - {"external_contact", "tracker_slip"}
+    lasting = {each.effect for each in nothing.candidates} - {"external_contact"}
     limited = {each.effect for each in nothing.limits}
     assert lasting <= limited
     assert all(each.size is None or each.size > 0.0 for each in nothing.limits)
