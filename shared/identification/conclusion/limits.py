@@ -13,7 +13,7 @@ import numpy as np
 from shared.identification.dataset.types import Float64
 from shared.identification.fitting.fit import Fit
 from shared.identification.search.looks import Columns, Looked
-from shared.identification.search.screen import shown_rows
+from shared.identification.search.screen import is_steady, shown_rows
 from shared.identification.search.searched import Search
 from shared.identification.verdict import NAMED_SHARE, Limit
 
@@ -49,7 +49,8 @@ def _limits(fit: Fit, columns: Columns) -> list[Limit]:
         forms: dict[bytes, list[Looked]] = {}
         for each in looked:
             forms.setdefault(each.look.form.tobytes(), []).append(each)
-        size = max(_size(basis, alike, wanted) for alike in forms.values())
+        is_smooth = is_steady(fit.space.problem.subject, candidate)
+        size = max(_size(basis, alike, wanted, is_smooth=is_smooth) for alike in forms.values())
         out.append(
             Limit(
                 effect=candidate.effect.name,
@@ -63,16 +64,17 @@ def _limits(fit: Fit, columns: Columns) -> list[Limit]:
     return out
 
 
-def _size(basis: Float64, looked: Sequence[Looked], wanted: float) -> float:
+def _size(basis: Float64, looked: Sequence[Looked], wanted: float, *, is_smooth: bool) -> float:
     """Return the size at which a change is as large as is wanted; infinite if none is.
 
     Between two that were simulated it goes by a power of the size, below them by the size itself,
-    and so beyond a single one. Of what acts from some size on nothing is known below them.
+    and beyond them, too, if it is smooth. Of what acts from some size on nothing is known below.
 
     Args:
         basis: float64[M, n], what the base can make up for.
         looked: at sizes of the first number, each with how that changes the residual.
         wanted: length of the change that is left.
+        is_smooth: whether small changes of the size change a little.
     """
     sizes, lengths = [0.0], [0.0]
     for each in sorted(looked, key=lambda one: abs(float(one.look.values[0][0]))):
@@ -82,8 +84,7 @@ def _size(basis: Float64, looked: Sequence[Looked], wanted: float) -> float:
         lengths.append(float(np.sqrt(max(column @ column - along @ along, 0.0))))
     above = next((index for index, length in enumerate(lengths) if length >= wanted), 0)
     if not above:
-        is_alone = len(sizes) == 2 and lengths[1] > 0.0
-        return sizes[1] * wanted / lengths[1] if is_alone else np.inf
+        return sizes[-1] * wanted / lengths[-1] if is_smooth and lengths[-1] > 0.0 else np.inf
     below, reached = lengths[above - 1], lengths[above]
     if below <= 0.0:
         return sizes[above] * (1.0 if looked[0].look.is_level else wanted / reached)

@@ -28,6 +28,7 @@ def test_every_effect_that_could_be_looked_for_has_a_limit(nothing: Verdict) -> 
     limited = {each.effect for each in nothing.limits}
     assert lasting <= limited
     assert all(each.size is None or each.size > 0.0 for each in nothing.limits)
+    assert _limit(nothing, "base_compliance").size is not None  # looked at with several sizes
 
 
 @pytest.mark.parametrize(
