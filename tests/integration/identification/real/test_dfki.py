@@ -31,18 +31,18 @@ def dry(problem: Problem) -> Fitted:
 def test_both_joints_rub(problem: Problem, dry: Fitted):
     """A fit with all masses as the authors have them gives 0.21 and 0.20 N m."""
     plain = fitted(problem)
-    assert dry.values["coulomb_friction shoulder"][0] == pytest.approx(0.222, abs=0.01)
-    assert dry.values["coulomb_friction elbow"][0] == pytest.approx(0.200, abs=0.01)
-    assert plain.test == pytest.approx(0.1438, abs=0.004)  # rad in windows of 0.3 s
-    assert dry.test == pytest.approx(0.0275, abs=0.0015)
+    assert dry.values["coulomb_friction shoulder"][0] == pytest.approx(0.243, abs=0.01)
+    assert dry.values["coulomb_friction elbow"][0] == pytest.approx(0.197, abs=0.01)
+    assert plain.test == pytest.approx(0.1197, abs=0.004)  # rad in windows of 0.3 s
+    assert dry.test == pytest.approx(0.0256, abs=0.0015)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_viscous_friction_fits_but_fails_on_what_was_held_out(problem: Problem, dry: Fitted):
     damped = fitted(problem, "viscous_friction")
-    assert damped.train == pytest.approx(0.0465, abs=0.003)
-    assert damped.test == pytest.approx(0.1212, abs=0.006)
+    assert damped.train == pytest.approx(0.0394, abs=0.003)
+    assert damped.test == pytest.approx(0.1284, abs=0.006)
     assert damped.test > 4.0 * dry.test
 
 
@@ -51,7 +51,8 @@ def test_viscous_friction_fits_but_fails_on_what_was_held_out(problem: Problem, 
 def test_neither_viscous_friction_nor_a_delay_is_left_beside_it(problem: Problem, dry: Fitted):
     damped = fitted(problem, "coulomb_friction", "viscous_friction")
     late = fitted(problem, "coulomb_friction", "command_latency")
-    assert damped.test == pytest.approx(dry.test, rel=0.02)
+    assert damped.test == pytest.approx(dry.test, rel=0.04)
+    assert abs(damped.values["viscous_friction elbow"][0]) < 0.001
     assert late.test == pytest.approx(dry.test, rel=0.02)
     assert late.values["command_latency"][0] == pytest.approx(0.0, abs=0.0006)
 
