@@ -48,7 +48,10 @@ def sentence_of(
         return f"What the simulation surely gets wrong: {_named(causes)}. Beside it: {told}"
     if word == "none":
         told = f"{ratio}{_by_all(held_out)}"
-        return f"Nothing to name: with its base fitted the simulation is at {told}."
+        return (
+            f"Nothing to name: with its base fitted the simulation is at {told}."
+            f"{_also_pushed(left)}"
+        )
     if word == "base_too_coarse":
         return (
             f"The base model does not fit: {ratio} are left with {listing(doubted)} as the model "
@@ -107,9 +110,10 @@ def _also_pushed(left: tuple[Unexplained, ...]) -> str:
     """Return what came from outside, or looks like it: sentences, each after a blank, or none."""
     told = ""
     if pushes := [each for each in left if each.is_external]:
-        first = pushes[0]
+        first, joints = pushes[0], list(dict.fromkeys(each.where for each in pushes))
         count = "once," if len(pushes) == 1 else f"{len(pushes)} times, most"
-        told = f" Something outside pushed {first.where} {count} {_most(first)}."
+        where = f" at {first.where}" if len(joints) > 1 else ""
+        told = f" Something outside pushed {listing(joints)} {count} {_most(first)}{where}."
     for where in dict.fromkeys(each.where for each in left if each.phase == AGAIN):
         own = [each for each in left if each.where == where and each.phase == AGAIN]
         told += (

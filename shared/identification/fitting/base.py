@@ -107,6 +107,14 @@ def fit_again(space: Space, saved: SavedFits) -> BaseFits:
     return BaseFits(nominal, begun, replace(whole, starts_agree=saved.starts_agree))
 
 
+def as_kept(done: BaseFits) -> BaseFits:
+    """Return a base's fits as a search that goes on will have them: first states go by these."""
+    whole = done.whole
+    names = tuple(each.name for each in whole.space.problem.parameters)
+    parts, z = tuple(done.parts.z.tolist()), tuple(whole.z.tolist())
+    return fit_again(whole.space, SavedFits(names, parts, z, whole.starts_agree))
+
+
 def fit_base(space: Space, rng: np.random.Generator) -> BaseFits:
     """Return the base's fit on the training recordings, the better one of two starts.
 

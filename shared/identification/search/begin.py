@@ -11,6 +11,7 @@ from shared.identification.effect import Candidate, Effect
 from shared.identification.fitting.base import (
     BaseFits,
     SavedFits,
+    as_kept,
     fit_again,
     fit_base,
     fit_without,
@@ -160,8 +161,9 @@ class _Step:
         done = (
             with_shown(fit_base(space, rng), self.shown) if fits is None else fit_again(space, fits)
         )
-        if fits is None and problem.noise.has_free_starts:
-            done = with_starts(done)
+        has_free_starts = fits is None and problem.noise.has_free_starts
+        if has_free_starts:
+            done = as_kept(with_starts(done))
         problem = done.whole.space.problem
         is_held = any(each not in problem.parameters for each in self.released)
         together = None
@@ -182,6 +184,8 @@ class _Step:
             bent = ", ".join(problem.parameters[index].name for index in doubted)
             self.progress("base fit", 0.5, f"without {bent}")
             done = _held(done, doubted)
+            if has_free_starts:
+                done = as_kept(done)
             family = _drives(done, self.candidates, self.seed)
         return done, family
 

@@ -195,6 +195,20 @@ def test_what_came_from_outside_is_called_external() -> None:
     assert "7.7 to 8.7 s, external, once:" in unexplained_text(pushed, verdict.held_out)
 
 
+def test_pushes_are_told_where_there_is_nothing_to_name_with_the_joints_they_were_at() -> None:
+    verdict = example("unexplained").verdict
+    one = msgspec.structs.replace(
+        verdict.unexplained[0], is_external=True, where="elbow", torque=0.22, torque_unit="N m"
+    )
+    other = msgspec.structs.replace(one, where="pan", torque=0.1)
+    told = sentence_of("none", (), (), verdict.held_out, (one,))
+    assert told.startswith("Nothing to name")
+    assert "Something outside pushed elbow once, from" in told
+    told = sentence_of("none", (), (), verdict.held_out, (one, other))
+    assert "pushed elbow and pan 2 times, most from" in told
+    assert told.endswith("with 0.22 N m at elbow.")
+
+
 @pytest.mark.parametrize("word", WORDS)
 def test_the_last_lines_say_the_verdict_and_where_the_report_is(word: str) -> None:
     verdict = example(word).verdict  # pyright: ignore[reportArgumentType]
