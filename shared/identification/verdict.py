@@ -9,6 +9,8 @@ SCHEMA = 1
 NAMED_SHARE = 0.1
 """Of what a model leaves without an effect: what the effect takes off where it is named nine times
 of ten (docs/identify_results.md)."""
+NAMED_RATIO = (NAMED_SHARE / (1.0 - NAMED_SHARE)) ** 0.5
+"""The same as a length: of what the effect does, by what is left without it."""
 Word = Literal["named", "none", "tie", "base_too_coarse", "unexplained"]
 
 

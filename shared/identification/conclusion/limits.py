@@ -15,7 +15,7 @@ from shared.identification.fitting.fit import Fit
 from shared.identification.search.looks import Columns, Looked
 from shared.identification.search.screen import is_steady, shown_rows
 from shared.identification.search.searched import Search
-from shared.identification.verdict import NAMED_SHARE, Limit
+from shared.identification.verdict import NAMED_RATIO, Limit
 
 
 def limits_of(found: Search) -> tuple[Limit, ...]:
@@ -42,7 +42,7 @@ def _limits(fit: Fit, columns: Columns) -> list[Limit]:
     """Return the limits of what changes the residual of a fit so, at the form that shows least."""
     basis = np.linalg.qr(fit.jacobian)[0]
     left = fit.residual - basis @ (basis.T @ fit.residual)
-    wanted = float(np.linalg.norm(left)) * float(np.sqrt(NAMED_SHARE / (1.0 - NAMED_SHARE)))
+    wanted = float(np.linalg.norm(left)) * NAMED_RATIO
     out: list[Limit] = []
     for candidate, looked in columns.items():
         quantity = candidate.effect.quantities(fit.space.problem.subject, candidate.place)[0]

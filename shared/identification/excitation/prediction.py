@@ -22,7 +22,7 @@ from shared.identification.fitting.parameters import base_parameters
 from shared.identification.fitting.problem import Problem, Variant
 from shared.identification.fitting.space import Space
 from shared.identification.noise.floor import Noise
-from shared.identification.verdict import NAMED_SHARE
+from shared.identification.verdict import NAMED_RATIO
 from shared.sim.plant.plant import pr2
 from shared.sim.plant.replay import Recorded
 from shared.sim.plant.rollouts import Rollouts
@@ -185,7 +185,7 @@ def predict(dataset: Dataset, noise: Noise, effects: Sequence[Effect]) -> Predic
     ratios = np.linalg.norm(bare, axis=0) * np.sqrt((1.0 - rho) / (1.0 + rho))
     # Of as much noise as there are numbers, as correlated as what is seen.
     noise_ratio = np.sqrt(found.shape[1] * (1.0 - rho) / (1.0 + rho))
-    wanted = float(noise_ratio * np.sqrt(NAMED_SHARE / (1.0 - NAMED_SHARE)))
+    wanted = float(noise_ratio * NAMED_RATIO)
     powers = [
         _power(subject, candidate, [ratios[column] for column, owner in enumerate(owners)
                                     if owner == index], wanted)
