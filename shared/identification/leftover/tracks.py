@@ -14,6 +14,7 @@ from shared.identification.dataset.types import Float64, Trajectory
 from shared.identification.fitting.parameters import enter_base
 from shared.identification.fitting.problem import BLOCK, DIVERGED, Problem, Variant
 from shared.identification.noise.blocks import block_means
+from shared.identification.noise.drift import Drift
 from shared.sim.plant.inverse import inverse_dynamics
 from shared.sim.plant.kinematics import tool_poses
 from shared.sim.plant.missing import missing_torque
@@ -143,7 +144,9 @@ def _joints(problem: Problem, segment: int, reports: Reports) -> tuple[Float64, 
         return recorded.begin + middles[: len(x)], x
     off = block_means(at, problem.segments[segment].q - reports.q, BLOCK)
     x = problem.in_floors(off, segment)
-    if recorded.begin > 0.0:
+    if isinstance(problem.noise.memory, Drift):
+        x /= problem.noise.memory.spread(len(x))[:, : x.shape[1]]
+    elif recorded.begin > 0.0:
         spread = _spread(at, middles, CUTS.get(problem.subject.control, CUT))
         if not problem.noise.is_measured:  # then the floor is what parts leave, spread and all
             spread /= np.median(spread)

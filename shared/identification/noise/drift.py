@@ -67,6 +67,18 @@ class Drift:
         """Return the same in noise floors that are larger by factors float64[C]."""
         return Drift(self.kinds / by[:, None] ** 2, self.slowing)
 
+    def begun_as(self, position: Float64, speed: Float64) -> "Drift":
+        """Return the same of parts whose first states are off by so much at least.
+
+        Args:
+            position: float64[C], standard deviations, in noise floors.
+            speed: float64[C], the same of speeds (1 / block).
+        """
+        kinds = self.kinds.copy()
+        kinds[:, 1] = np.maximum(kinds[:, 1], position**2)
+        kinds[:, 2] = np.maximum(kinds[:, 2], speed**2)
+        return Drift(kinds, self.slowing)
+
     def beside(self, other: "Drift") -> "Drift":
         """Return that of these channels, then of others."""
         kinds = np.concatenate([self.kinds, other.kinds])

@@ -27,7 +27,6 @@ from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.signals import pose_error, sampled, sampled_poses
 
 Integers = NDArray[np.intp]
-Bools = NDArray[np.bool_]
 
 _BAND = 25
 """Without repeats: readings that a local cubic is taken through."""
@@ -75,6 +74,11 @@ class Noise:
     def is_torque(self) -> bool:
         """Return whether residuals are torques that the model lacks, not readings."""
         return self.torque is not None
+
+    @property
+    def is_adrift(self) -> bool:
+        """Return whether it grows from the start of a part, since nothing holds the arm."""
+        return isinstance(self.memory, Drift)
 
     @property
     def is_white(self) -> bool:
@@ -194,7 +198,8 @@ def noise_of(
         correlation = np.r_[correlation, found.correlation[len(whitened) :]]
         found = replace(unit, whitened=whitened, correlation=correlation)
         hidden = np.zeros(len(whitened))
-    return _remembered(found, pairs, nominal, hidden)
+    doubt = states_doubt(dataset.trajectories, rounding, CUTS["torque"])
+    return _remembered(found, pairs, nominal, hidden, doubt, block)
 
 
 def _remembered(
@@ -202,6 +207,8 @@ def _remembered(
     pairs: Sequence[Difference],
     nominal: Rollouts | None,
     rounding: Float64,
+    doubt: Float64 | None,
+    block: float,
 ) -> Noise:
     """Return the noise with how much of it is carried on, or how it grows.
 
@@ -210,6 +217,9 @@ def _remembered(
         pairs: what repeats differ by.
         nominal: the arm; None for one that is held by its joints.
         rounding: float64[J], what an encoder's steps hide, in noise floors.
+        doubt: float64[2, J], how well first states are known (rad, m; rad/s, m/s): what a motion
+            that is no polynomial makes of them is the same each time, so that no repeat tells.
+        block: what residuals are averaged over (s).
     """
     joints: list[Float64] = []
     tracker: list[Float64] = []
@@ -222,6 +232,8 @@ def _remembered(
     no_steps = np.zeros(0 if noise.tracker is None else len(noise.tracker))
     if nominal is not None and nominal.plant.control == "torque":
         drift = drift_of(joints, OF_PAIR, rounding)
+        if drift is not None and doubt is not None:
+            drift = drift.begun_as(doubt[0] / noise.joints, block * doubt[1] / noise.joints)
         seen = drift_of(tracker, OF_PAIR, no_steps) if tracker else None
         if drift is not None and (noise.tracker is None or seen is not None):
             blocks = max(len(each) for each in joints)
@@ -296,27 +308,41 @@ def _difference(
     first: Trajectory, second: Trajectory, block: float, starts: Starts, cut: Cut | None
 ) -> Difference:
     spans = np.zeros((0, 2)) if cut is None else spans_of(first, cut)
-
-    def parts_of(at: Float64, count: int) -> tuple[Integers, Bools]:
-        """Return which part each block is of, the last that has begun, and whether it is in it."""
-        times = block_means(at, at[:, None], block)[:count, 0]
-        parts = np.searchsorted(spans[:, 0], times, side="right")
-        ends = np.r_[np.inf, spans[:, 1]]
-        if cut is None or not cut.dodge:  # what follows the last part is counted as of it
-            ends[-1] = np.inf
-        return parts, times < ends[parts]
-
-    joints = block_means(first.joints_at, _against(first, second, starts), block)
-    q = block_means(first.joints_at, first.q, block)[: len(joints)]
-    parts, is_in = parts_of(first.joints_at, len(joints))
-    is_known = np.isfinite(joints).all(axis=1) & is_in
-    found = Difference(joints[is_known], None, q[is_known], parts[is_known], None)
+    if not len(spans):
+        spans = np.array([[-np.inf, np.inf]])
+    off = _against(first, second, starts)
+    beside_it = np.concatenate([off, first.q[: len(off)]], axis=1)
+    both, parts = _in_parts(first.joints_at, beside_it, spans, block)
+    joints, q = np.split(both, 2, axis=1)
+    found = Difference(joints, None, q, parts, None)
     if first.tracker_at is None or second.tracker_at is None:
         return found
-    tracker = block_means(first.tracker_at, _tracker_against(first, second, starts), block)
-    parts, is_in = parts_of(first.tracker_at, len(tracker))
-    is_known = np.isfinite(tracker).all(axis=1) & is_in
-    return replace(found, tracker=tracker[is_known], tracker_parts=parts[is_known])
+    off = _tracker_against(first, second, starts)
+    tracker, parts = _in_parts(first.tracker_at, off, spans, block)
+    return replace(found, tracker=tracker, tracker_parts=parts)
+
+
+def _in_parts(
+    at: Float64, values: Float64, spans: Float64, block: float
+) -> tuple[Float64, Integers]:
+    """Return float64[B, D], block means as residuals have them, and int[B], of which part each is.
+
+    Args:
+        at: float64[T] (s), rising.
+        values: float64[T', D] of the first T' instants; blocks with one that is NaN are left out.
+        spans: float64[P, 2], when parts begin and end (s): blocks are counted from there.
+        block: length (s).
+    """
+    at = at[: len(values)]
+    found: list[Float64] = []
+    for begin, end in spans:
+        inside = (at >= begin) & (at < end)
+        if inside.any():
+            means = block_means(at[inside], values[inside], block)
+            found.append(means[np.isfinite(means).all(axis=1)])
+        else:
+            found.append(values[:0])
+    return np.concatenate(found), np.repeat(np.arange(len(found)), [len(each) for each in found])
 
 
 def _against(first: Trajectory, second: Trajectory, starts: Starts) -> Float64:

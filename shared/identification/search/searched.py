@@ -270,7 +270,9 @@ def _is_much(found: Search, left: Left) -> bool:
 def plain_losses(found: Search) -> tuple[Float64, Float64, Float64]:
     """Return float64[S] of held-out stretches of the nominal model, the base and the current one.
 
-    Of plain residuals; those of the search where nothing is known of what noise carries on.
+    Of plain residuals; those of the search where nothing is known of what noise carries on, and
+    where nothing holds the arm: what a part is off by at its end is what its start was off by, one
+    number a part, so that of a right model half as much again may be left or half as much.
     """
     nothing = Variant(np.zeros(len(found.problem.parameters)))
     base, current = Model(found.base, found.base_losses), so_far(found)
@@ -287,7 +289,7 @@ def plain_losses_of(problem: Problem, model: "Model") -> Float64:
 
 
 def _plain(problem: Problem, variant: Variant, losses: Float64) -> Float64:
-    if problem.noise.memory is None:
+    if problem.noise.memory is None or problem.noise.is_adrift:
         return losses
     return plain_stretches(problem, variant, problem.of("test"))
 

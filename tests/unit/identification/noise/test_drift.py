@@ -54,6 +54,23 @@ def test_a_part_in_which_something_happened_makes_no_noise_of_it():
     assert told.spread(_BLOCKS) == pytest.approx(usual.spread(_BLOCKS), rel=0.25)
 
 
+def test_parts_may_begin_further_off_than_repeats_say_but_no_nearer():
+    rng = np.random.default_rng(3)
+    drift = drift_of(list(_parts(rng, 60, 0.0)), 1.0, np.zeros(1))
+    assert drift is not None
+    same = drift.begun_as(np.zeros(1), np.zeros(1))
+    assert same.spread(_BLOCKS) == pytest.approx(drift.spread(_BLOCKS))
+    further = drift.begun_as(np.zeros(1), np.array([3.0]))
+    slowing, at = float(drift.slowing[0]), np.arange(_BLOCKS) + 0.5
+    assert slowing > 0.0
+    way = -np.expm1(-slowing * at) / slowing
+    steady, pushed = (3.0 * each[None, :, None] for each in (way, 0.1 * at**2))
+    wrong, right = (float(np.mean(_news(each, steady) ** 2)) for each in (drift, further))
+    assert wrong > 4.0
+    assert right < 0.3
+    assert np.mean(_news(further, pushed) ** 2) > 2.0  # no first speed makes up for that
+
+
 def test_in_larger_noise_floors_noise_is_smaller_and_what_is_new_as_large():
     rng = np.random.default_rng(2)
     parts = _parts(rng, 60, 0.0)

@@ -6,14 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shared.identification.arm.parts import CUTS
 from shared.identification.arm.subject import subject_of
 from shared.identification.dataset.types import Dataset, Float64, ModelSource, Trajectory
-from shared.identification.fitting.problem import BLOCK
+from shared.identification.fitting.problem import BLOCK, Problem
 from shared.identification.hidden.generator import simulated
 from shared.identification.hidden.recipe import Recipe
 from shared.identification.noise.blocks import block_means
 from shared.identification.noise.drift import Drift
-from shared.identification.noise.floor import noise_of
+from shared.identification.noise.floor import noise_of, repeat_differences
 
 AT = 0.02 * np.arange(400.0)
 """A reading a block, 8 s."""
@@ -119,6 +120,23 @@ def test_a_floor_is_never_under_what_an_encoders_steps_hide():
     assert noise_of(swung, 0.02, {}).joints.max() < 0.01  # the sine that was added has no steps
     still = replace(swung, trajectories=tuple(replace(each, q=held) for each in swung.trajectories))
     assert noise_of(still, 0.02, {}).joints == pytest.approx(0.01 / np.sqrt(12.0))
+
+
+def test_repeats_are_compared_in_the_blocks_that_residuals_of_parts_have():
+    dataset, _ = simulated(Recipe(arm="torque2", seconds=6.0, train=2, test=1, seed=5))
+    subject = subject_of(dataset)
+    pair, *_ = repeat_differences(dataset, BLOCK, subject.starts, CUTS["torque"])
+    problem = Problem(subject, dataset, (), noise_of(dataset, BLOCK, subject.starts))
+    repeated_one = next(each.repeats for each in dataset.trajectories if each.repeats)
+    names = [each.name for each in dataset.trajectories]
+    own = [
+        index
+        for index, each in enumerate(problem.segments)
+        if names[each.trajectory] == repeated_one
+    ]
+    where = [problem.positions(each) for each in own]
+    assert np.bincount(pair.joints_parts).tolist() == [len(each) for each in where]
+    assert pair.q == pytest.approx(np.concatenate(where), abs=1e-12)
 
 
 def test_noise_grows_under_torques_and_is_not_whitened_where_commands_answer_it():
