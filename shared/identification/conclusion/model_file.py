@@ -150,7 +150,8 @@ def _mjcf_file(
             carried.append(_said(entry, False, _how_to_apply(entry, "model.xml")))
     row = _whole(dataset, subject, verdict, native)
     if np.any(row.current("dof_frictionloss") > 0.0):
-        row.field("dof_solimp")  # what friction holds is to stick, or creep, as it does in the fit
+        for field in ("dof_solimp", "dof_solref"):  # what friction holds is to stick, or creep,
+            row.field(field)  # and to turn round as it does in the fit
     path = dataset.source.path
     assert path is not None  # a plant was made of it
     text = patched_xml(subject.plant, path, _structure(native), row.fields)

@@ -29,6 +29,16 @@ Entry = Callable[[Row], None]
 """Lets base parameters and effects into one arm."""
 
 
+def _turn_at_once(model: mujoco.MjModel) -> None:
+    """Let friction turn round when a joint does, of joints whose file has none.
+
+    MuJoCo's default brings a joint to a stand within 20 ms (solreffriction), so that friction turns
+    round some 10 ms before the joint does: at each reversal an arm that nothing holds is given a
+    speed that it has not. The least that it can be is two steps.
+    """
+    model.dof_solref[model.dof_frictionloss == 0.0] = 2.0 * model.opt.timestep, 1.0
+
+
 def as_it_is(_: Row) -> None:
     """Change nothing of the nominal arm."""
 
@@ -52,6 +62,8 @@ class Rollouts:
         self.model = compiled(plant, structure)
         for impedance in (self.model.dof_solimp, self.model.tendon_solimp_fri):
             impedance[:, :2] = np.maximum(impedance[:, :2], _STICKS)
+        if plant.control != "pose":
+            _turn_at_once(self.model)
         self._joints = [self.model.joint(name) for name in plant.joints]
         self._qpos = np.array([int(joint.qposadr[0]) for joint in self._joints])
         self._dofs = np.array([int(joint.dofadr[0]) for joint in self._joints])

@@ -31,10 +31,10 @@ def dry(problem: Problem) -> Fitted:
 def test_both_joints_rub(problem: Problem, dry: Fitted):
     """A fit with all masses as the authors have them gives 0.21 and 0.20 N m."""
     plain = fitted(problem)
-    assert dry.values["coulomb_friction shoulder"][0] == pytest.approx(0.243, abs=0.01)
-    assert dry.values["coulomb_friction elbow"][0] == pytest.approx(0.197, abs=0.01)
+    assert dry.values["coulomb_friction shoulder"][0] == pytest.approx(0.2495, abs=0.01)
+    assert dry.values["coulomb_friction elbow"][0] == pytest.approx(0.1897, abs=0.01)
     assert plain.test == pytest.approx(0.1197, abs=0.004)  # rad in windows of 0.3 s
-    assert dry.test == pytest.approx(0.0256, abs=0.0015)
+    assert dry.test == pytest.approx(0.0247, abs=0.0015)
 
 
 @pytest.mark.slow

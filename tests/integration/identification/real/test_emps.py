@@ -51,7 +51,7 @@ def test_dry_friction_and_an_offset_take_off_most_of_what_is_held_out(
     plain, dry = fitted(problem), fitted(problem, "coulomb_friction")
     assert 1e3 * plain.test == pytest.approx(1.30, abs=0.03)  # mm in windows of 0.3 s
     assert 1e3 * dry.test == pytest.approx(0.66, abs=0.03)
-    assert 1e3 * rubbing.test == pytest.approx(0.33, abs=0.02)
+    assert 1e3 * rubbing.test == pytest.approx(0.314, abs=0.02)
 
 
 @pytest.mark.slow
@@ -64,7 +64,7 @@ def test_an_asymmetric_viscous_friction_says_the_same_as_the_offset_and_more(
     alone = fitted(problem, "coulomb_friction", "asymmetric_friction")
     assert alone.values["asymmetric_friction carriage"][0] == pytest.approx(-39.2, abs=1.5)
     assert abs(both.values["torque_bias carriage"][0]) < 0.5
-    assert 1e3 * alone.test == pytest.approx(0.238, abs=0.012)
+    assert 1e3 * alone.test == pytest.approx(0.223, abs=0.012)
     assert alone.test < 0.9 * rubbing.test
     assert both.test > 0.98 * alone.test
 
