@@ -35,6 +35,7 @@ from shared.identification.search.misstated import misstated
 from shared.identification.search.once import is_named, take_back_pushes, take_pushes
 from shared.identification.search.rounds import search
 from shared.identification.search.searched import Search, is_open
+from shared.identification.search.trimmed import led_astray
 from shared.identification.verdict import Unexplained, Verdict
 from shared.runtime.build import commit
 from shared.runtime.service import version
@@ -105,15 +106,17 @@ def identify(
         return begun(with_timestep(dataset, step), folder_of("shorter_step"), aside)
 
     begins = begun(dataset, resume_folder)
+    if aside := led_astray(begins):
+        progress("base fit", 0.0, f"again, {_without(aside)}")
+        begins = begun(dataset, folder_of("not_led_astray"), aside)
     if (
         begins.problem.noise.has_free_starts
         and (step := shorter(begins.base, _STEP_SHOWS)) is not None
     ):
-        begins = begun_at(step)
+        begins = begun_at(step, begins.problem.aside)
     found, left = _searched(begins, run)
     if is_open(found) and (aside := pushed_in(found, left)):
-        names = listing(sorted({each.trajectory for each in aside}))
-        progress("base fit", 0.0, f"again, without what was pushed in {names}")
+        progress("base fit", 0.0, f"again, {_without(aside)}")
         other = begun(found.problem.dataset, folder_of("without_pushes"), aside)
         other, other_left = _searched(other, run, _pushes(left))
         if other.plainly.least < found.plainly.least:
@@ -166,6 +169,10 @@ class _Run:
     clock: _Stages
     effects: tuple[Effect, ...]
     """What may be named."""
+
+
+def _without(aside: tuple[Span, ...]) -> str:
+    return f"without what was pushed in {listing(sorted({each.trajectory for each in aside}))}"
 
 
 def _searched(
@@ -287,6 +294,7 @@ def _verdict(
         base=conclusion.base,
         caveats=(
             *_uncounted(found),
+            *_not_fitted_to(found),
             *filter(
                 None,
                 [
@@ -346,6 +354,16 @@ def _uncounted(found: Search) -> tuple[str, ...]:
     return (
         f"{BLOCK * blocks:.1f} s of the held-out recordings are not counted: something outside "
         "pushed the arm there",
+    )
+
+
+def _not_fitted_to(found: Search) -> tuple[str, ...]:
+    seconds = sum(each.end - each.begin for each in found.problem.aside)
+    if not seconds:
+        return ()
+    return (
+        f"{seconds:.1f} s of the other recordings were not fitted to: something outside pushed the "
+        "arm there",
     )
 
 

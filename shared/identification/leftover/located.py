@@ -81,7 +81,8 @@ def leftovers(
     found: list[tuple[float, Unexplained]] = []
     pushed: list[tuple[float, Unexplained]] = []
     if joints:
-        pushes = pushes_of(joints, [missing.of(track) for track in joints])
+        happened = [_is_aside(problem, track) for track in joints]
+        pushes = pushes_of(joints, [missing.of(track) for track in joints], happened)
         pushed = _pushed(problem, joints, pushes, missing)
         kept = [each for each in known if not any(_is_same(each, one) for _, one in pushed)]
         pushed += [(_blocks(each) * each.times_noise**2, each) for each in kept]
@@ -98,6 +99,16 @@ def leftovers(
     pushed.sort(key=lambda each: -each[0])
     listed = [*found[:MOST], *pushed[:MOST_PUSHES]]
     return tuple(each for _, each in sorted(listed, key=lambda each: -each[0]))
+
+
+def _is_aside(problem: Problem, track: Track) -> NDArray[np.bool_]:
+    """Return bool[B], which blocks nothing was fitted to, since something happened there."""
+    name = problem.dataset.trajectories[track.trajectory].name
+    spans = [each for each in problem.aside if each.trajectory == name]
+    out = np.zeros(len(track.at), np.bool_)
+    for each in spans:
+        out |= (each.begin <= track.at) & (track.at < each.end)
+    return out
 
 
 class _Missing:

@@ -59,13 +59,21 @@ class Push:
     """Whether it is one of so many at its joint that they are a law rather than pushes."""
 
 
-def pushes_of(tracks: Sequence[Track], missing: Sequence[Float64]) -> tuple[Push, ...]:
+def pushes_of(
+    tracks: Sequence[Track],
+    missing: Sequence[Float64],
+    happened: Sequence[NDArray[np.bool_]] | None = None,
+) -> tuple[Push, ...]:
     """Return the pushes in recordings.
 
     Args:
         tracks: of the joints.
         missing: float64[B, J], the torque that is missing in each (N m, N).
+        happened: bool[B] of each, where it is known that something happened: there a torque need
+            only be plain to be a push.
     """
+    if happened is None:
+        happened = [np.zeros(len(each), np.bool_) for each in missing]
     found: list[Push] = []
     for joint in range(missing[0].shape[1] if missing else 0):
         every = np.concatenate([each[:, joint] for each in missing])
@@ -76,14 +84,18 @@ def pushes_of(tracks: Sequence[Track], missing: Sequence[Float64]) -> tuple[Push
         own: list[Push] = []
         for number, (track, torque) in enumerate(zip(tracks, torques, strict=True)):
             for piece in _pieces(torque, _FAR * usual):
-                size = float(np.median(np.abs(torque[piece])))
-                if not _is_sudden(torque, piece, size) or not _is_seen(track.x[:, joint], piece):
-                    continue
-                if _goes_with_state(states, torques, number, piece, size):
+                if not _is_seen(track.x[:, joint], piece):
                     continue
                 begin = max(float(track.at[piece.start]) - 0.5 * BLOCK, 0.0)
                 end = float(track.at[piece.stop - 1]) + 0.5 * BLOCK
-                own.append(Push(number, joint, piece, begin, end))
+                push = Push(number, joint, piece, begin, end)
+                if happened[number][piece].any():
+                    found.append(push)
+                    continue
+                size = float(np.median(np.abs(torque[piece])))
+                is_sudden = _is_sudden(torque, piece, size)
+                if is_sudden and not _goes_with_state(states, torques, number, piece, size):
+                    own.append(push)
         found += [] if _follow_reversals(tracks, own, joint) else own
     pushed = {each.joint for each in found}
     again = {joint for joint in pushed if _recur(found, joint, len(tracks))}

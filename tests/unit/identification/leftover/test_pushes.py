@@ -63,6 +63,20 @@ def test_what_lets_go_after_reversals_is_no_push() -> None:
     assert pushes_of(tracks, [each[:, None] for each in torques]) == ()
 
 
+def test_where_something_is_known_to_have_happened_a_push_may_come_after_a_reversal() -> None:
+    rng = np.random.default_rng(6)
+    tracks = [track(index, np.full(len(_AT), 30.0)) for index in range(2)]
+    turns = _AT[:-1][np.diff(np.sign(tracks[0].qd[:, 0])) != 0.0]
+    begin = float(turns[2]) + 0.15
+    torques = [noise(rng) + pulse(begin), noise(rng)]
+    both = [each[:, None] for each in torques]
+    assert pushes_of(tracks, both) == ()
+    happened = [(begin - 0.2 < _AT) & (begin + 0.6 > _AT), np.zeros(len(_AT), np.bool_)]
+    (found,) = pushes_of(tracks, both, happened)
+    assert found.track == 0
+    assert (found.begin, found.end) == pytest.approx((begin, begin + 0.4), abs=0.06)
+
+
 def test_noise_is_no_push_and_neither_is_what_no_position_shows() -> None:
     for seed in range(5):
         rng = np.random.default_rng(seed)
