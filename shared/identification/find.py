@@ -362,7 +362,7 @@ def _not_fitted_to(found: Search) -> tuple[str, ...]:
     if not seconds:
         return ()
     return (
-        f"{seconds:.1f} s of the other recordings were not fitted to: something outside pushed the "
+        f"{seconds:.1f} s of the recordings to fit to were left out: something outside pushed the "
         "arm there",
     )
 
