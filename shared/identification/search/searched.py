@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shared.identification.dataset.types import Float64
-from shared.identification.effect import Candidate, Quantity
+from shared.identification.effect import Candidate, Quantity, Side
 from shared.identification.fitting.fit import Fit, Start
 from shared.identification.fitting.problem import Problem, Variant
 from shared.identification.gate.foretold import Foretold, Held
@@ -26,6 +26,8 @@ MAY_BE_LEFT = 0.12
 """Share of the base fit's mean square residual that named causes may leave where that is more:
 what is far larger than the noise is never modelled to the last digit. Large play or elasticity of a
 PR2 leaves 8 to 11 %; what is named for something that is not looked for, 23 % and more."""
+EXACT: tuple[Side, ...] = ("joints", "tracker")
+"""Sides of which that holds nothing: what is read wrongly is geometry, so nothing is left of it."""
 BESIDE_A_DOUBT = 10.0
 """The most that it may be where the base itself is doubted: more than that may hide anything."""
 HARDLY_ANY = 0.002
@@ -260,7 +262,8 @@ def _is_much(found: Search, left: Left) -> bool:
     if found.accepted:
         if left.current >= left.nominal:
             return True
-        share = MAY_BE_LEFT * left.base
+        is_exact = all(one.candidate.effect.side in EXACT for one in found.accepted)
+        share = 0.0 if is_exact else MAY_BE_LEFT * left.base
         if found.doubted:
             share = min(share, max(BESIDE_A_DOUBT, HARDLY_ANY * left.base))
         return left.least > max(BESIDE_A_NAME, share)
