@@ -5,7 +5,7 @@ import math
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,8 +83,9 @@ class Problem:
     _bins: dict[int, tuple[Bins, Bins | None]] = field(init=False)
     _whitening: dict[int, Float64 | None] = field(init=False)
     _lacking: Lacking = field(init=False)
-    _doubts: dict[int, Doubt] = field(init=False)
-    """What residuals have in them of first states, by segment; where that is taken off."""
+    _doubts: dict[int, dict[str, Doubt]] = field(init=False)
+    """What residuals have in them of first states, by segment; where that is taken off: of them as
+    they are, and of what is new in each block."""
 
     def __post_init__(self) -> None:
         self.segments = segments_of(self.dataset, self.subject, self.window)
@@ -219,9 +220,17 @@ class Problem:
         ``BLOCK``; C are the joints, then position and rotation of the tracker.
         """
         return [
-            [self.noise.news(each) for each in parts]
-            for parts in self._plain(variants, segments, timestep)
+            [
+                self._without("new", self.noise.news(each), segment)
+                for each, segment in zip(parts, segments, strict=True)
+            ]
+            for parts in self._off(variants, segments, timestep)
         ]
+
+    def _without(self, which: Literal["plain", "new"], off: Float64, segment: int) -> Float64:
+        """Return float64[B, C] without what a segment's first state may be off by."""
+        doubts = self._doubts.get(segment)
+        return off if doubts is None else doubts[which].without(off, self.uncounted.get(segment))
 
     def shape_of(self, segment: int) -> tuple[int, int]:
         """Return the shape of a segment's :meth:`residuals`: blocks, channels."""
@@ -251,16 +260,17 @@ class Problem:
 
         What is slow counts for as much there as what is fast.
         """
-        return self._plain([variant], segments)[0]
+        parts = self._off([variant], segments)[0]
+        return [self._without("plain", *each) for each in zip(parts, segments, strict=True)]
 
-    def _plain(
+    def _off(
         self, variants: Sequence[Variant], segments: Sequence[int], timestep: float | None = None
     ) -> list[list[Float64]]:
         if (floor := self.noise.torque) is not None:
             return [[one / floor for one in self._lacks(each, segments)] for each in variants]
         return [
             [
-                self.floors(report, segment)
+                self._floors(report, segment)
                 for report, segment in zip(reports, segments, strict=True)
             ]
             for reports in self.reports(variants, segments, timestep)
@@ -332,14 +342,16 @@ class Problem:
             reports: what a variant would have logged.
             segment: of which part.
         """
+        return self._without("plain", self._floors(reports, segment), segment)
+
+    def _floors(self, reports: Reports, segment: int) -> Float64:
+        """Return the same with what first states may be off by."""
         joints, tracker = self.raw(reports, segment)
         of_joints, of_tracker = self._bins[segment]
         out = self.in_floors(of_joints.mean(joints), segment)
         if tracker is not None and of_tracker is not None and self.noise.tracker is not None:
             out = beside(out, of_tracker.mean(tracker) / self.noise.tracker)
-        out = np.nan_to_num(out, nan=DIVERGED, posinf=DIVERGED, neginf=-DIVERGED)
-        doubt = self._doubts.get(segment)
-        return out if doubt is None else doubt.without(out, self.uncounted.get(segment))
+        return np.nan_to_num(out, nan=DIVERGED, posinf=DIVERGED, neginf=-DIVERGED)
 
     def _free_starts(self, segments: Sequence[int]) -> None:
         """See to it that it is known of segments what they are off by where they begin."""
@@ -348,7 +360,11 @@ class Problem:
         new = [each for each in segments if each not in self._doubts]
         errors = self.free_starts.of([self.segments[each].recorded for each in new])
         for segment, error in zip(new, errors, strict=True):
-            self._doubts[segment] = Doubt.of(self._in_floors_of(error, segment))
+            columns = self._in_floors_of(error, segment)
+            new = [self.noise.news(each) for each in np.moveaxis(columns, -1, 0)]
+            self._doubts[segment] = {
+                "plain": Doubt.of(columns), "new": Doubt.of(np.stack(new, axis=-1))
+            }  # fmt: skip
 
     def _in_floors_of(self, error: StartErrors, segment: int) -> Float64:
         """Return float64[B, C, K]: what starts are off by, in floors as residuals are."""

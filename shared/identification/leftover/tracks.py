@@ -141,17 +141,17 @@ def _joints(problem: Problem, segment: int, reports: Reports) -> tuple[Float64, 
     middles = block_means(at, recorded.joints_at[:, None], BLOCK)[:, 0]
     if problem.noise.has_free_starts:
         x = problem.floors(reports, segment)[:, : len(problem.noise.joints)]
-        return recorded.begin + middles[: len(x)], x
-    off = block_means(at, problem.segments[segment].q - reports.q, BLOCK)
-    x = problem.in_floors(off, segment)
+    else:
+        off = block_means(at, problem.segments[segment].q - reports.q, BLOCK)
+        x = problem.in_floors(off, segment)
     if isinstance(problem.noise.memory, Drift):
-        x /= problem.noise.memory.spread(len(x))[:, : x.shape[1]]
-    elif recorded.begin > 0.0:
+        x = x / problem.noise.memory.spread(len(x))[:, : x.shape[1]]
+    elif recorded.begin > 0.0 and not problem.noise.has_free_starts:
         spread = _spread(at, middles, CUTS.get(problem.subject.control, CUT))
         if not problem.noise.is_measured:  # then the floor is what parts leave, spread and all
             spread /= np.median(spread)
-        x /= spread[:, None]
-    return recorded.begin + middles, x
+        x = x / spread[:, None]
+    return recorded.begin + middles[: len(x)], x
 
 
 def _spread(at: Float64, middles: Float64, cut: Cut) -> Float64:

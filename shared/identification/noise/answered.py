@@ -1,9 +1,10 @@
 """The noise floor of an arm under torques that answer what happens to it.
 
-Given twice, such commands are not the same: a controller that is not in the model sent them. How
-noise grows in a part cannot be told from that, as what pushes an arm is in its commands a moment
-later. What is left of a part beyond what its first state may be off by does not grow much, and
-what repeats differ by of that is the noise floor.
+Given twice, such commands are not the same: a controller that is not in the model sent them, and
+what pushes an arm is in them a moment later. So what a part and its repeat are compared by is what
+the model is off by, each under its own commands, beyond what first states may be off by. Where
+there are parts enough to say so it grows as what pushes the arm makes it (``drift.py``): counted
+block by block it would be known fifty times as well as it is.
 """
 
 from collections.abc import Iterable, Sequence
@@ -17,6 +18,7 @@ from shared.identification.arm.start_errors import Doubt, start_errors
 from shared.identification.dataset.programmes import difference
 from shared.identification.dataset.types import Dataset, Float64, Trajectory
 from shared.identification.noise.blocks import beside, block_means
+from shared.identification.noise.drift import Drift, drift_of
 from shared.identification.noise.quiet import OF_PAIR
 from shared.sim.plant.replay import Recorded
 from shared.sim.plant.rollouts import Rollouts, as_it_is
@@ -40,6 +42,10 @@ class Answered:
     """float64[C], standard deviations of block means, joints first (rad, m)."""
     correlation: Float64
     """float64[C], of neighbouring blocks."""
+    drift: Drift | None = None
+    """How it grows in a part from a first state that is known, in levels."""
+    blocks: int = 0
+    """Of a part."""
 
 
 def answers(dataset: Dataset) -> bool:
@@ -53,7 +59,7 @@ def answers(dataset: Dataset) -> bool:
 
 
 def answered_noise(
-    dataset: Dataset, nominal: Rollouts, cut: Cut, block: float, starts: Float64
+    dataset: Dataset, nominal: Rollouts, cut: Cut, block: float, starts: Float64, rounding: Float64
 ) -> Answered | None:
     """Return the noise floor beyond first states; None of recordings too short for parts.
 
@@ -63,6 +69,7 @@ def answered_noise(
         cut: says how recordings are replayed in parts.
         block: what residuals are averaged over (s).
         starts: float64[2, J], standard deviations of first states.
+        rounding: float64[J], what an encoder's steps hide (rad, m).
     """
     by_name = {each.name: each for each in dataset.trajectories}
     found: list[tuple[Float64, Float64]] = []
@@ -81,7 +88,16 @@ def answered_noise(
             for off, columns in found
         ]
         level = np.maximum(_level_of(left), _TINY)
-    return Answered(level, _correlation_of(left))
+    correlation = _correlation_of(left)
+    parts = [off for off, _ in found]
+    usual = OF_PAIR * np.sqrt(np.mean(np.concatenate(parts) ** 2, axis=0))
+    usual = np.maximum(usual, _TINY)
+    least = np.zeros_like(usual)
+    least[: len(rounding)] = rounding / usual[: len(rounding)]
+    drift = drift_of([each / usual for each in parts], OF_PAIR, least)
+    if drift is None:
+        return Answered(level, correlation)
+    return Answered(usual, correlation, drift.of_pushes(), max(len(each) for each in parts))
 
 
 def _level_of(parts: Sequence[Float64]) -> Float64:

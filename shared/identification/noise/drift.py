@@ -6,8 +6,8 @@ they are, residuals say what the last blocks of a part say. What is new in each 
 the blocks before it foretell, weighs all of them by how much they know (generalised least squares,
 Aitken 1936; of a state that a white force moves, a Kalman filter's innovations).
 
-Only where repeats measure it: the same commands twice do not answer what pushes the arm. Those of a
-controller that is not in the model do, within one block, and look late for that (``answered.py``).
+Only where repeats measure it. Commands of a controller that is not in the model answer what pushes
+the arm, so what is compared there is what each recording is off by under its own (``answered.py``).
 """
 
 # pyright: basic
@@ -77,6 +77,12 @@ class Drift:
         kinds = self.kinds.copy()
         kinds[:, 1] = np.maximum(kinds[:, 1], position**2)
         kinds[:, 2] = np.maximum(kinds[:, 2], speed**2)
+        return Drift(kinds, self.slowing)
+
+    def of_pushes(self) -> "Drift":
+        """Return the same of parts whose first states are known."""
+        kinds = self.kinds.copy()
+        kinds[:, 1:3] = 0.0
         return Drift(kinds, self.slowing)
 
     def beside(self, other: "Drift") -> "Drift":

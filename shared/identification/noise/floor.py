@@ -270,17 +270,18 @@ def _answered(
         block: what residuals are averaged over (s).
         doubt: float64[2, J], standard deviations of first states.
     """
-    found = answered_noise(dataset, nominal, CUTS["torque"], block, doubt)
+    found = answered_noise(dataset, nominal, CUTS["torque"], block, doubt, rounding)
     if found is None:
         return None
     count = len(rounding)
-    return Noise(
+    noise = Noise(
         joints=np.maximum(found.levels[:count], rounding),
         tracker=found.levels[count:] if dataset.has_tracker else None,
         correlation=found.correlation,
         is_measured=True,
         start_doubt=doubt,
     )
+    return noise if found.drift is None else noise.growing(found.drift, found.blocks)
 
 
 def _split(values: Float64, parts: Integers) -> list[Float64]:

@@ -38,10 +38,14 @@ def test_commands_given_twice_that_differ_answer(dataset: Dataset):
 
 
 def test_beyond_first_states_repeats_differ_as_readings_do(dataset: Dataset):
-    found = answered_noise(dataset, subject_of(dataset).nominal, CUT, 0.02, STARTS)
+    nominal = subject_of(dataset).nominal
+    found = answered_noise(dataset, nominal, CUT, 0.02, STARTS, np.zeros(3))
     assert found is not None
+    assert found.drift is not None
     reading = ARM.noise * np.sqrt(ARM.period / 0.02)
-    assert found.levels == pytest.approx(np.full(3, reading), rel=0.3)
+    grown = found.levels * found.drift.spread(found.blocks)
+    assert grown[0] == pytest.approx(np.full(3, reading), rel=0.3)
+    assert np.all(grown[-1] < 5.0 * reading)  # nothing pushes it
     assert np.all(found.correlation < 0.3)
 
 
@@ -50,4 +54,5 @@ def test_recordings_too_short_for_parts_say_nothing(dataset: Dataset):
         replace(each, joints_at=each.joints_at[:9], q=each.q[:9]) for each in dataset.trajectories
     )
     nominal = subject_of(dataset).nominal
-    assert answered_noise(replace(dataset, trajectories=short), nominal, CUT, 0.02, STARTS) is None
+    cut = replace(dataset, trajectories=short)
+    assert answered_noise(cut, nominal, CUT, 0.02, STARTS, np.zeros(3)) is None
