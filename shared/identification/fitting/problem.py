@@ -266,6 +266,7 @@ class Problem:
     def _off(
         self, variants: Sequence[Variant], segments: Sequence[int], timestep: float | None = None
     ) -> list[list[Float64]]:
+        """Return residuals as they are, with what first states may be off by, in noise floors."""
         if (floor := self.noise.torque) is not None:
             return [[one / floor for one in self._lacks(each, segments)] for each in variants]
         return [
@@ -361,9 +362,9 @@ class Problem:
         errors = self.free_starts.of([self.segments[each].recorded for each in new])
         for segment, error in zip(new, errors, strict=True):
             columns = self._in_floors_of(error, segment)
-            new = [self.noise.news(each) for each in np.moveaxis(columns, -1, 0)]
+            fresh = [self.noise.news(each) for each in np.moveaxis(columns, -1, 0)]
             self._doubts[segment] = {
-                "plain": Doubt.of(columns), "new": Doubt.of(np.stack(new, axis=-1))
+                "plain": Doubt.of(columns), "new": Doubt.of(np.stack(fresh, axis=-1))
             }  # fmt: skip
 
     def _in_floors_of(self, error: StartErrors, segment: int) -> Float64:
