@@ -73,7 +73,8 @@ def test_an_arm_under_torques_goes_by_what_it_does_not_by_how_parts_begin(tmp_pa
     convert(tmp_path / "set", arm_named("hanging_torques", 1), "none", 8.0, 1)
     verdict = identify(read_dataset(tmp_path / "set"), seed=1).verdict
     assert (verdict.verdict, verdict.timestep) == ("none", 0.0005), verdict.sentence
-    assert verdict.held_out.joints_mrad["noise_floor"] < 0.1
+    # What random torques make of a part beyond its start (ADR 0020).
+    assert verdict.held_out.joints_mrad["noise_floor"] == pytest.approx(0.195, abs=0.03)
 
 
 @pytest.mark.parametrize(
