@@ -358,14 +358,15 @@ class Problem:
         """See to it that it is known of segments what they are off by where they begin."""
         if self.free_starts is None:
             return
-        new = [each for each in segments if each not in self._doubts]
-        errors = self.free_starts.of([self.segments[each].recorded for each in new])
-        for segment, error in zip(new, errors, strict=True):
+        unknown = [each for each in segments if each not in self._doubts]
+        errors = self.free_starts.of([self.segments[each].recorded for each in unknown])
+        for segment, error in zip(unknown, errors, strict=True):
             columns = self._in_floors_of(error, segment)
-            fresh = [self.noise.news(each) for each in np.moveaxis(columns, -1, 0)]
-            self._doubts[segment] = {
-                "plain": Doubt.of(columns), "new": Doubt.of(np.stack(fresh, axis=-1))
-            }  # fmt: skip
+            plain = new = Doubt.of(columns)
+            if self.noise.memory is not None:
+                fresh = [self.noise.news(each) for each in np.moveaxis(columns, -1, 0)]
+                new = Doubt.of(np.stack(fresh, axis=-1))
+            self._doubts[segment] = {"plain": plain, "new": new}
 
     def _in_floors_of(self, error: StartErrors, segment: int) -> Float64:
         """Return float64[B, C, K]: what starts are off by, in floors as residuals are."""

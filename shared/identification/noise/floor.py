@@ -198,7 +198,9 @@ def noise_of(
         correlation = np.r_[correlation, found.correlation[len(whitened) :]]
         found = replace(unit, whitened=whitened, correlation=correlation)
         hidden = np.zeros(len(whitened))
-    doubt = states_doubt(dataset.trajectories, rounding, CUTS["torque"])
+    doubt = None
+    if nominal is not None and nominal.plant.control == "torque":
+        doubt = states_doubt(dataset.trajectories, rounding, CUTS["torque"])
     return _remembered(found, pairs, nominal, hidden, doubt, block)
 
 
