@@ -115,17 +115,14 @@ def of_start(trajectory: Trajectory, has_initial: bool, has_velocity: bool) -> l
         speeds = np.abs(first_velocities(joints_at, trajectory.q)[0])
         fastest = int(np.argmax(speeds))
         if speeds[fastest] > LEAST:
-            is_taken = bool(trajectory.initial_qd[fastest])
-            taken = (
-                "which is taken from its first readings"
-                if is_taken
-                else (
-                    "and is taken to be at rest, as its first readings do not surely show a speed"
+            told = f"the arm starts at {speeds[fastest]:.3g} rad/s, taken from its first readings;"
+            if not trajectory.initial_qd[fastest]:
+                told = (
+                    f"the arm goes at {speeds[fastest]:.3g} rad/s in its first readings, which do "
+                    "not surely say that it did before, and is taken to start at rest; if not,"
                 )
-            )
             found.append(Caveat("moving_start", name, (
-                f"the arm starts at {speeds[fastest]:.3g} rad/s, {taken}; give "
-                "initial_velocity, or log velocities"
+                f"{told} give initial_velocity, or log velocities"
             )))  # fmt: skip
     return found
 

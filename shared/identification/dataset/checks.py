@@ -61,9 +61,12 @@ def check_time(table: Table) -> None:
     if len(steps) and steps.min() <= 0:
         row = int(np.argmax(steps <= 0))
         what = "the same as" if steps[row] == 0 else "before"
+        advice = "sort the rows and leave one of each time"
+        if steps.min() == 0 and np.count_nonzero(steps == 0) > 0.5 * len(steps):
+            advice = "most are alike, so they look like whole seconds: write nanoseconds"
         raise IdentificationError(
             f"{table.path}: column {TIME!r}, row {row + 1} ({t_ns[row + 1]}) is {what} row {row} "
-            f"({t_ns[row]}): times must rise; sort the rows and leave one of each time"
+            f"({t_ns[row]}): times must rise; {advice}"
         )
     length = float(t_ns[-1] - t_ns[0]) / 1e9
     if length > LONGEST:

@@ -48,7 +48,7 @@ def of_programmes(trajectories: Sequence[Trajectory]) -> list[Caveat]:
         )))  # fmt: skip
     for each in trajectories:
         twins = [one.name for one in train if difference(one, each) < ALIKE]
-        if each.split == "test" and twins:
+        if each.split == "test" and not each.repeats and twins:
             found.append(Caveat("test_is_train", each.name, (
                 f"its commands are those of the train recording {twins[0]!r}: it says little "
                 "about other motions; hold out another motion"

@@ -77,7 +77,7 @@ def read_dataset(folder: Path | str) -> Dataset:
     _check_copies(folder, trajectories)
     trajectories, differing = repeats_of(trajectories, manifest.control)
     found += caveats.of_set(trajectories, joints, manifest.control)
-    found += of_programmes(trajectories) + differing
+    found = followed.among_all(found, len(trajectories)) + of_programmes(trajectories) + differing
     return Dataset(
         folder, source, manifest.control, joints, actuators, tuple(trajectories), tuple(found),
         files.hash,
@@ -176,7 +176,8 @@ def _check_commands(
     sent = {each: command.columns[each][rows] for each in joints if each in command.columns}
     for joint, positions in sent.items():
         checks.check_unit(command.path, joint, positions, got[joint])
-    return followed.of_commands(name, sent, got)
+    at: Float64 = 1e-9 * (readings.t_ns - readings.t_ns[0])
+    return followed.of_commands(name, at, sent, got)
 
 
 def _positions(

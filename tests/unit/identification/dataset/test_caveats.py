@@ -177,7 +177,7 @@ def test_a_start_in_motion_without_velocities_is_told_and_taken(tmp_path):
     joints = rows(motion(1), slice(50, None))
     logged = float(joints.pop("qd_elbow")[0]), float(joints.pop("qd_shoulder")[0])
     rewritten(folder, 1, joints)
-    assert "rad/s, which is taken from its first readings" in the(folder, "moving_start").text
+    assert "rad/s, taken from its first readings" in the(folder, "moving_start").text
     taken = read_dataset(folder).trajectories[1].initial_qd
     assert sorted(taken) == pytest.approx(sorted(logged), rel=0.02, abs=0.02)
 
@@ -189,7 +189,7 @@ def test_a_start_that_may_be_of_rest_is_told_and_taken_for_rest(tmp_path):
     joints["q_elbow"] = joints["q_elbow"] + 0.0
     joints["q_elbow"][[0, 1, 4, 7]] += 0.03
     rewritten(folder, 1, joints)
-    assert "and is taken to be at rest" in the(folder, "moving_start").text
+    assert "and is taken to start at rest" in the(folder, "moving_start").text
     assert not read_dataset(folder).trajectories[1].initial_qd.any()
 
 
@@ -277,11 +277,36 @@ def test_torques_are_not_taken_for_positions(tmp_path):
 
 def test_torques_that_are_called_positions_are_told(tmp_path):
     folder = written(tmp_path)
+    for seed in range(3):
+        if seed == 1:
+            assert "as they do in other recordings" in the(folder, "follows_little").text
+        joints = motion(seed)
+        times = (joints["t_ns"] - joints["t_ns"][0]) / 1e9
+        sent = {name: np.sin((9.0 + index) * times) for index, name in enumerate(JOINTS)}
+        rewritten(folder, seed, joints, command(joints) | sent)
+    found = [each for each in read_dataset(folder).caveats if each.name == "follows_none"]
+    assert len(found) == 3
+    assert 'write control = "torque"' in found[0].text
+
+
+@pytest.mark.parametrize("times", [0.4, 1.0, 3.1416])
+def test_joints_that_go_another_number_of_times_as_far_are_told(tmp_path, times):
+    folder = written(tmp_path)
     joints = motion(1)
-    times = (joints["t_ns"] - joints["t_ns"][0]) / 1e9
-    sent = {name: np.sin((9.0 + index) * times) for index, name in enumerate(JOINTS)}
-    rewritten(folder, 1, joints, command(joints) | sent)
-    assert 'write control = "torque"' in the(folder, "follows_none").text
+    sent = command(joints)
+    rewritten(folder, 1, joints, sent | {name: sent[name] / times for name in JOINTS})
+    found = [each for each in read_dataset(folder).caveats if each.name == "other_scale"]
+    assert len(found) == (0 if times == 1.0 else len(JOINTS))
+    assert all("times as far" in each.text for each in found)
+
+
+def test_of_a_command_that_stands_still_nothing_is_asked(tmp_path):
+    folder = written(tmp_path)
+    for seed in range(3):
+        joints = motion(seed)
+        still = {name: np.full(len(joints["t_ns"]), 0.3) for name in JOINTS}
+        rewritten(folder, seed, joints, command(joints) | still)
+    assert not {each.name for each in read_dataset(folder).caveats} & set(MIXED_UP)
 
 
 def test_joints_that_move_alike_or_lag_are_told_nothing_of(tmp_path):
