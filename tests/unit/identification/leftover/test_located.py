@@ -79,6 +79,18 @@ def test_a_push_is_located_at_its_joint_and_within_a_tenth_of_a_second(
     assert found[0].is_external
 
 
+def test_what_comes_back_when_a_recording_is_repeated_is_left_over_and_no_push(
+    tmp_path: Path,
+) -> None:
+    def enter(row: Row) -> None:
+        if row.trajectory in ("first", "again"):
+            row.torque(PUSH, np.array([3.0, 0.0, 0.0, 2.0]))
+
+    found = left(problem_with(tmp_path, enter))
+    assert found[0].where == "elbow"
+    assert not any(each.is_external for each in found)
+
+
 def test_a_push_that_is_known_is_told_again_where_it_does_not_show_anew(tmp_path: Path) -> None:
     def enter(row: Row) -> None:
         if row.trajectory == "second":
