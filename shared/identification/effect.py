@@ -45,6 +45,11 @@ class Quantity:
     least: float = 0.0
     """Below this size, either way, it is no more than what the simulation is off by itself."""
 
+    @property
+    def is_detail(self) -> bool:
+        """Return whether it says how, and there is one place only to look first."""
+        return len(self.grid) == 1
+
 
 class Effect(Protocol):
     """One entry of the catalogue; a module of ``catalogue/`` has one, called ``EFFECT``."""

@@ -30,7 +30,7 @@ from shared.identification.search.bent import is_worse, otherwise, worse_than_fi
 from shared.identification.search.beyond import is_of_gears, is_seen_beyond, may_be_beyond
 from shared.identification.search.cleared import clear
 from shared.identification.search.far import bent_beyond_belief
-from shared.identification.search.likeness import is_only_like
+from shared.identification.search.likeness import why_only_like
 from shared.identification.search.misstated import misstated
 from shared.identification.search.once import is_named, take_back_pushes, take_pushes
 from shared.identification.search.rounds import search
@@ -137,7 +137,7 @@ def identify(
         if not found.accepted:
             found.otherwise = otherwise(found, progress)
         elif not any(found.rivals):
-            found.is_only_like = is_only_like(found)
+            found.only_like = why_only_like(found)
     clock.over("search")
     progress("diagnostics", 0.0)
     evidence = _evidence(found)

@@ -1,16 +1,30 @@
 """A joint rubs by the same torque however fast it moves, and sticks when it stands."""
 
+import numpy as np
+
 from shared.identification.arm.places import moving, place_of
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.laws.passive import add_friction
+from shared.identification.laws.bend import bend_of
+from shared.identification.laws.passive import add_friction, at_joint
 from shared.sim.plant.row import Row
+from shared.sim.plant.step import Step
 from shared.sim.plant.structure import Structure
 
 
+class _Law:
+    """Values are each joint's level."""
+
+    def __call__(self, step: Step, values: Float64) -> Float64:
+        return values
+
+
+_LAW = _Law()
+
+
 class CoulombFriction:
-    """Dry friction of a joint, beyond what its model file has."""
+    """Dry friction of a joint, beyond what its model file has; it turns round over its bend."""
 
     name = "coulomb_friction"
     title = "the joint's dry friction is not what the model file says"
@@ -28,11 +42,13 @@ class CoulombFriction:
         return tuple(place.label for place in moving(subject) if known[place.dof] == 0.0)
 
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
-        """Return the torque: ``level``, or ``difference`` where the file has some."""
+        """Return the torque (``level``, or ``difference`` from the file's), and its bend."""
         joint = place_of(subject, place)
         known = float(subject.nominal.model.dof_frictionloss[joint.dof])
-        name = "difference" if known else "level"
-        return (Quantity(name, joint.torque, -known, 2.0 * joint.drive, probe=0.1 * joint.drive),)
+        most, probe = 2.0 * joint.drive, 0.1 * joint.drive
+        if known:  # that turns round at once, and so does what is added to it or taken off
+            return (Quantity("difference", joint.torque, -known, most, probe),)
+        return Quantity("level", joint.torque, 0.0, most, probe), bend_of(joint)
 
     def structure(self, subject: Subject, place: str) -> Structure:
         """Return nothing: every joint may rub."""
@@ -40,7 +56,12 @@ class CoulombFriction:
 
     def enter(self, row: Row, place: str, values: Float64) -> None:
         """Let the joint rub."""
-        add_friction(row, place, float(values[0]))
+        level = float(values[0])
+        add_friction(row, place, level)
+        if level and values[1:].any():  # what bends is in the place of what the model has now
+            soft, ways = at_joint(row, place, level), at_joint(row, place, float(values[1]))
+            row.friction(_LAW, -soft, np.zeros_like(ways))
+            row.friction(_LAW, soft, ways)
 
 
 EFFECT = CoulombFriction()

@@ -13,7 +13,14 @@ from shared.identification.gate.certainty import half_widths, is_there
 from shared.identification.gate.held_out import compare, floor_of
 from shared.identification.search.bent import ties_with_base
 from shared.identification.search.far import far_from_file
-from shared.identification.search.searched import ALIKE, Search, Tried, is_open, plain_losses
+from shared.identification.search.searched import (
+    ALIKE,
+    Search,
+    Tried,
+    is_open,
+    plain_losses,
+    why_open,
+)
 from shared.identification.verdict import (
     BaseValue,
     Cause,
@@ -61,7 +68,8 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
     word = _word(found, ties, left)
     sure = tuple(cause for cause, rivals in zip(accepted, found.rivals, strict=True) if not rivals)
     told = accepted if word == "unexplained" else sure
-    sentence = sentence_of(word, told, ties, held_out, left, found.is_only_like, found.doubted)
+    not_believed = why_open(found) or f"and {found.only_like}"
+    sentence = sentence_of(word, told, ties, held_out, left, not_believed, found.doubted)
     far = far_from_file(found)
     return Conclusion(
         word=word,
@@ -102,7 +110,7 @@ def extended(found: Search) -> Variant:
 
 def _word(found: Search, ties: tuple[Tie, ...], left: tuple[Unexplained, ...]) -> Word:
     if found.accepted:
-        if is_open(found) or found.is_only_like:
+        if is_open(found) or found.only_like:
             return "unexplained"
         return "tie" if ties else "named"
     if is_open(found):
@@ -202,8 +210,8 @@ def _why_not(
 ) -> str:
     base = float(found.base_losses.mean())
     if label in accepted:
-        if found.is_only_like:
-            return "other effects at its joint fit what it leaves by more than chance"
+        if found.only_like:
+            return found.only_like
         return "" if word == "named" else "too much is left over with it" * (word == "unexplained")
     if label in rivals:
         return f"does as well as what was taken, within {ALIKE:.0%} of the gain or its error"

@@ -11,6 +11,7 @@ from typing import cast
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from shared.errors import IdentificationError
 from shared.identification.arm.subject import Subject, recorded_of, subject_of
@@ -26,7 +27,10 @@ from shared.sim.plant.pr2_parameters import FIELDS, pr2_parameters
 from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure
+from shared.telemetry.wording import listing
 
+_NATIVE = {"fields", "rests"}
+"""What of a row an MJCF can say."""
 _FIELD_WORDS = {
     "dof_damping": "damping",
     "dof_dampingpoly": "damping",
@@ -68,7 +72,14 @@ class _Entry:
     cause: Cause
     effect: Effect
     values: Float64
+    details: NDArray[np.bool_]
+    """bool[Q], which numbers say how and may be left out."""
     structure: Structure
+
+    @property
+    def plain(self) -> "_Entry":
+        """Return it without details."""
+        return dataclasses.replace(self, values=np.where(self.details, 0.0, self.values))
 
 
 def model_file(dataset: Dataset, verdict: Verdict) -> ModelFile:
@@ -140,11 +151,18 @@ def _mjcf_file(
     native: list[_Entry] = []
     for entry in entries:
         touched, changed = _touched(dataset, subject, entry)
-        if changed <= {"fields", "rests"}:
+        if changed <= _NATIVE:
             native.append(entry)
             said = f"as {_words(touched)}" if touched else "in its structure"
             if entry.structure:
                 said += "; a joint was added for it"
+            carried.append(_said(entry, True, said))
+            continue
+        touched, changed = _touched(dataset, subject, entry.plain)
+        if touched and changed <= _NATIVE:
+            native.append(entry.plain)
+            left = listing([q.name for q, value in _named(subject, entry) if q.is_detail and value])
+            said = f"as {_words(touched)}; its {left} the file cannot hold"
             carried.append(_said(entry, True, said))
         else:
             carried.append(_said(entry, False, _how_to_apply(entry, "model.xml")))
@@ -164,10 +182,12 @@ def _entry(subject: Subject, cause: Cause) -> _Entry:
         raise IdentificationError(f"the verdict names {cause.effect!r}, which no effect is called")
     known = {**cause.others, cause.quantity: cause.value}
     quantities = effect.quantities(subject, cause.where)
-    if lost := [quantity.name for quantity in quantities if quantity.name not in known]:
+    details = np.array([quantity.is_detail for quantity in quantities], np.bool_)
+    lost = [each.name for each in quantities if each.name not in known and not each.is_detail]
+    if lost:
         raise IdentificationError(f"the verdict's {cause.effect} lacks {', '.join(lost)}")
-    values = np.array([known[quantity.name] for quantity in quantities], np.float64)
-    return _Entry(cause, effect, values, effect.structure(subject, cause.where))
+    values = np.array([known.get(quantity.name, 0.0) for quantity in quantities], np.float64)
+    return _Entry(cause, effect, values, details, effect.structure(subject, cause.where))
 
 
 def _whole(dataset: Dataset, subject: Subject, verdict: Verdict, native: Sequence[_Entry]) -> Row:

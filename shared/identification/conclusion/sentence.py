@@ -19,7 +19,7 @@ def sentence_of(
     ties: tuple[Tie, ...],
     held_out: HeldOut,
     left: tuple[Unexplained, ...],
-    is_only_like: bool = False,
+    not_believed: str = "",
     doubted: tuple[str, ...] = (),
 ) -> str:
     """Return the verdict for people.
@@ -30,7 +30,7 @@ def sentence_of(
         ties: what is not told apart.
         held_out: how much is left.
         left: where.
-        is_only_like: whether the causes stand in for a law that is not known.
+        not_believed: why the causes are told of and not named: ``which is too much``.
         doubted: numbers of links that are held, since the base went further than is believable.
     """
     floor = "the noise" if held_out.is_floor_measured else "what the base fit usually leaves"
@@ -60,14 +60,9 @@ def sentence_of(
         )
     if causes:
         names = " and ".join(f"{label(cause)} ({_size(cause)})" for cause in causes)
-        why = "which is too much to believe it"
-        if held_out.extended >= held_out.nominal:
-            why = f"and the model file as it is {held_out.nominal:.2f}"
-        elif is_only_like:
-            why = "which is not noise: other effects at the same joint fit that by more than chance"
         return (
             f"Something is wrong that no effect of the catalogue explains. Nearest comes {names}, "
-            f"but from {ratio} it leaves {held_out.extended:.2f}, {why}."
+            f"but from {ratio} it leaves {held_out.extended:.2f}, {not_believed}."
         )
     if left and all(each.is_external for each in left):
         if held_out.base_fit**2 <= NEARLY_NOISE:

@@ -63,6 +63,12 @@ class Space:
         return np.array(base + [np.inf] * len(self.quantities))
 
     @property
+    def details(self) -> Float64:
+        """Return float64[n], where nothing is there and details of what might be are as looked."""
+        extra = [each.grid[0] / each.probe if each.is_detail else 0.0 for each in self.quantities]
+        return np.r_[np.zeros(self.base_size), extra]
+
+    @property
     def steps(self) -> Float64:
         """Return float64[n], of difference quotients."""
         return np.array([_STEP] * self.base_size + [_EXTRA_STEP] * len(self.quantities))

@@ -57,7 +57,7 @@ def by_torques(space: Space) -> Float64:
     low, high = space.bounds
     low = np.where(free, np.expm1(low), low)
     high = np.where(free, np.expm1(high), high)
-    u = np.zeros(space.size)
+    u = space.details
     for _ in range(_STEPS):
         here = residual(u)
         steps = np.where(free, _STEP * (1.0 + u), space.steps)

@@ -47,7 +47,8 @@ def relatives(candidates: Sequence[Candidate], of: Candidate, fit: Fit) -> tuple
     subject, taken = fit.space.problem.subject, fit.space.candidates
     if of.place not in subject.joints:
         return ()
-    if any(each.grid or not each.is_smooth for each in of.effect.quantities(subject, of.place)):
+    quantities = of.effect.quantities(subject, of.place)
+    if any(len(each.grid) > 1 or not each.is_smooth for each in quantities):
         return ()
     left = tuple(
         each for each in candidates if each.effect.name == of.effect.name and each not in taken
@@ -78,7 +79,8 @@ def look_elsewhere(
     problem, space = fit.space.problem, fit.space
     for each in others:
         space = space.grown(each)
-    together = polish(space, np.r_[fit.z, np.zeros(space.size - fit.space.size)], train, _STEPS)
+    start = np.r_[fit.z, space.details[fit.space.size :]]
+    together = polish(space, start, train, _STEPS)
     after = stretches(problem, space.variant(together.z), test)
     kept = [
         each for each in others if compare(left_without(together, each, test), after, rng).is_sure
@@ -99,11 +101,13 @@ def look_elsewhere(
 def left_without(fit: Fit, candidate: Candidate, test: tuple[int, ...]) -> Float64:
     """Return held-out losses where the rest makes up for a missing effect as well as it can.
 
-    As far as the fit's derivative says, and no worse than if it did not.
+    As far as the fit's derivative says, and no worse than if it did not. Numbers that say how it
+    is have no say in that: of what is not there they change nothing.
     """
     space = fit.space
-    own = space.where(candidate)
-    way = -fit.spread[:, own] @ np.linalg.solve(fit.spread[own, own], fit.z[own])
+    is_form = candidate.forms(space.problem.subject)
+    own = np.arange(space.size)[space.where(candidate)][~is_form]
+    way = -fit.spread[:, own] @ np.linalg.solve(fit.spread[np.ix_(own, own)], fit.z[own])
     found: list[Float64] = []
     for share in _WAYS:
         z = fit.z + share * way

@@ -10,7 +10,7 @@ import numpy as np
 from shared.identification.arm.projection import basis_of, without
 from shared.identification.search.looks import columns_of, looks_of
 from shared.identification.search.screen import is_steady
-from shared.identification.search.searched import Search
+from shared.identification.search.searched import Search, is_at_end
 
 _EACH = 4.0
 """What each way in which other laws move the residual takes off the cost: noise has half of one.
@@ -29,7 +29,24 @@ _RANK = 0.1
 """Of the largest singular value: laws that do nearly the same are one way."""
 
 
-def is_only_like(found: Search) -> bool:
+def why_only_like(found: Search) -> str:
+    """Return why what was named only stands in for another law, for people; nothing if it does not.
+
+    Args:
+        found: a search that is over.
+    """
+    subject = found.problem.subject
+    for candidate, values in found.current.variant.extras:
+        quantities = candidate.effect.quantities(subject, candidate.place)
+        for value, each in zip(values.tolist(), quantities, strict=True):
+            if is_at_end(value, each):
+                return f"its {each.name} came to where that is no such law any more"
+    if _goes_along(found):
+        return "other effects at the same joint fit what it leaves by more than chance"
+    return ""
+
+
+def _goes_along(found: Search) -> bool:
     """Return whether what was named leaves what other laws at its place take off, beyond noise.
 
     Args:

@@ -94,11 +94,7 @@ class Tried:
     @property
     def is_of_another_law(self) -> bool:
         """Return whether a number that says how is where the law is no longer this one."""
-        return any(
-            (each.ends[0] and value <= each.low + _AT_END * (each.high - each.low))
-            or (each.ends[1] and value >= each.high - _AT_END * (each.high - each.low))
-            for value, each in self._numbers
-        )
+        return any(is_at_end(value, each) for value, each in self._numbers)
 
     @property
     def _numbers(self) -> list[tuple[float, Quantity]]:
@@ -106,6 +102,13 @@ class Tried:
         subject, place = self.fit.space.problem.subject, self.candidate.place
         values = self.fit.space.values(self.fit.z)[-1]
         return list(zip(values, self.candidate.effect.quantities(subject, place), strict=True))
+
+
+def is_at_end(value: float, quantity: Quantity) -> bool:
+    """Return whether a number that says how is where the law is no longer this one."""
+    near = _AT_END * (quantity.high - quantity.low)
+    is_low = quantity.ends[0] and value <= quantity.low + near
+    return is_low or (quantity.ends[1] and value >= quantity.high - near)
 
 
 def cosine(one: Tried, other: Tried) -> float:
@@ -205,8 +208,9 @@ class Search:
     by_all: ByAll | None = None
     """What the current model leaves once it is fitted to all recordings; None where it was not
     asked."""
-    is_only_like: bool = False
-    """Whether what was accepted only stands in for a law that is not known (``likeness.py``)."""
+    only_like: str = ""
+    """Why what was accepted only stands in for a law that is not known, see ``likeness.py``;
+    nothing if it does not."""
 
     @property
     def base_parts(self) -> Fit:
@@ -258,16 +262,42 @@ def is_open(found: Search) -> bool:
     return _is_much(found, found.left) or _is_much(found, found.plainly)
 
 
+def why_open(found: Search) -> str:
+    """Return why what was accepted is not believed, for people; nothing if it may be.
+
+    Numbers are root mean squares, in noise floors.
+    """
+    if not (found.accepted and is_open(found)):
+        return ""
+    left, is_told = found.left, True
+    if not _is_much(found, left):
+        left, is_told = found.plainly, False
+    if left.current >= left.nominal:
+        return f"and the model file as it is {left.nominal**0.5:.2f}"
+    if is_told and left.current >= left.base:
+        return "which is no less"
+    limit = f"too much to believe it ({_most(found, left) ** 0.5:.2f} at most)"
+    if is_told:
+        return f"which is {limit}"
+    lies = f"{left.least**0.5:.2f} of {left.base**0.5:.2f}"
+    return f"and of how far readings are off, slow drift and all, {lies}: {limit}"
+
+
 def _is_much(found: Search, left: Left) -> bool:
-    if found.accepted:
-        if left.current >= left.nominal:
-            return True
-        is_exact = all(one.candidate.effect.side in EXACT for one in found.accepted)
-        share = 0.0 if is_exact else MAY_BE_LEFT * left.base
-        if found.doubted:
-            share = min(share, max(BESIDE_A_DOUBT, HARDLY_ANY * left.base))
-        return left.least > max(BESIDE_A_NAME, share)
-    return left.least > NEARLY_NOISE
+    if found.accepted and left.current >= left.nominal:
+        return True
+    return left.least > _most(found, left)
+
+
+def _most(found: Search, left: Left) -> float:
+    """Return what may be left, mean square."""
+    if not found.accepted:
+        return NEARLY_NOISE
+    is_exact = all(one.candidate.effect.side in EXACT for one in found.accepted)
+    share = 0.0 if is_exact else MAY_BE_LEFT * left.base
+    if found.doubted:
+        share = min(share, max(BESIDE_A_DOUBT, HARDLY_ANY * left.base))
+    return max(BESIDE_A_NAME, share)
 
 
 def plain_losses(found: Search) -> tuple[Float64, Float64, Float64]:

@@ -8,10 +8,12 @@ from typing import TypeVar
 import numpy as np
 
 from shared.sim.arm import Float64
+from shared.sim.plant.bristles import Bristles
 from shared.sim.plant.row import FrictionLaw, Row, TorqueLaw
-from shared.sim.plant.step import Rows, rows_of
+from shared.sim.plant.step import Rows, Step, rows_of
 
 _Law = TypeVar("_Law", TorqueLaw, FrictionLaw)
+_Kept = TypeVar("_Kept")
 
 
 @dataclass
@@ -36,35 +38,62 @@ class Rubbing:
     """K arms of the batch."""
     values: Float64
     """float64[K, P]."""
+    bristles: Bristles | None
+    """None where it turns round at once in all of them."""
+
+    def rub(self, step: Step, at_once: Float64, damping: Float64, torque: Float64) -> None:
+        """Add what it does in a step to that of all N arms.
+
+        Args:
+            step: the state of its own arms.
+            at_once: float64[N, J], friction that the simulator lets stick (N m, N).
+            damping: float64[N, J], that it takes implicitly (N m s/rad, N s/m).
+            torque: float64[N, J] (N m, N).
+        """
+        level = self.law(step, self.values)
+        if self.bristles is None:
+            at_once[self.rows] += level
+            return
+        bent, stiff = self.bristles.act(level, step.qd, step.timestep)
+        torque[self.rows] += bent
+        damping[self.rows] += stiff
+        at_once[self.rows] += np.where(self.bristles.are_there, 0.0, level)
 
 
 def torques_of(rows: Sequence[Row]) -> list[Active]:
     """Return the torques at work, each with the arms that it acts on."""
     return [
-        Active(law, rows_of(members), values, np.zeros((len(members), law.memory)))
-        for law, members, values in _by_law([(row.index, row.laws) for row in rows])
+        Active(law, rows_of(members), np.stack(values), np.zeros((len(members), law.memory)))
+        for law, members, values in _by_law([(row, row.laws) for row in rows])
     ]
 
 
 def frictions_of(rows: Sequence[Row]) -> list[Rubbing]:
     """Return the frictions at work, each with the arms that it acts on."""
-    return [
-        Rubbing(law, rows_of(members), values)
-        for law, members, values in _by_law([(row.index, row.frictions) for row in rows])
-    ]
+    speeds = {row.index: row.initial_qd for row in rows}
+    found: list[Rubbing] = []
+    for law, members, each in _by_law(
+        [(row, [(one.law, one) for one in row.frictions]) for row in rows]
+    ):
+        ways = np.stack([one.ways for one in each])
+        speed = np.stack([speeds[member] for member in members])
+        bristles = Bristles(ways, speed) if ways.any() else None
+        values = np.stack([one.values for one in each])
+        found.append(Rubbing(law, rows_of(members), values, bristles))
+    return found
 
 
 def _by_law(
-    rows: Sequence[tuple[int, list[tuple[_Law, Float64]]]],
-) -> list[tuple[_Law, list[int], Float64]]:
-    """Return each law with arms and values; several times if an arm has it several times."""
-    groups: dict[tuple[_Law, int], list[tuple[int, Float64]]] = defaultdict(list)
-    for index, laws in rows:
+    rows: Sequence[tuple[Row, list[tuple[_Law, _Kept]]]],
+) -> list[tuple[_Law, list[int], list[_Kept]]]:
+    """Return each law with its arms and what they gave it; several times if an arm did so."""
+    groups: dict[tuple[_Law, int], list[tuple[int, _Kept]]] = defaultdict(list)
+    for row, laws in rows:
         seen: dict[_Law, int] = defaultdict(int)
-        for law, values in laws:
-            groups[law, seen[law]].append((index, values))
+        for law, kept in laws:
+            groups[law, seen[law]].append((row.index, kept))
             seen[law] += 1
     return [
-        (law, [index for index, _ in group], np.stack([values for _, values in group]))
+        (law, [index for index, _ in group], [kept for _, kept in group])
         for (law, _), group in groups.items()
     ]

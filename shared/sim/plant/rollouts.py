@@ -270,6 +270,9 @@ class Rollouts:
         tool = np.empty((len(ids), count, 7))
         rubs = self._expanded["dof_frictionloss"] if frictions else np.empty((0, 0))
         rubbed = np.array(rubs[arms, moved]) if frictions else rubs
+        has_bristles = any(each.bristles is not None for each in frictions)
+        damps = self._expanded["dof_damping"] if has_bristles else rubs
+        damped = np.array(damps[arms, moved]) if has_bristles else rubs
         beside = self._controllers
         if beside is not None and not len(beside.rows):
             beside = None
@@ -302,10 +305,12 @@ class Rollouts:
                 rotors=self._rotors,
             )
             if frictions:
-                total = rubbed.copy()
+                at_once, damping = rubbed.copy(), damped.copy()
                 for each in frictions:
-                    total[each.rows] += each.law(Step(moment, each.rows), each.values)
-                rubs[arms, moved] = total
+                    each.rub(Step(moment, each.rows), at_once, damping, added)
+                rubs[arms, moved] = at_once
+                if has_bristles:
+                    damps[arms, moved] = damping
             for each in laws:
                 added[each.rows] += each.law(Step(moment, each.rows), each.values, each.memory)
             applied[arms, moved] = added
@@ -315,6 +320,8 @@ class Rollouts:
             tool[:, index] = sensors[arms, self._tool]
         if frictions:
             rubs[arms, moved] = rubbed
+        if has_bristles:
+            damps[arms, moved] = damped
         return q, tool
 
 
@@ -332,7 +339,8 @@ def _motion_of(row: Row, recorded: Recorded) -> Hashable:
         row.initial_q.tobytes(),
         row.initial_qd.tobytes(),
         tuple(sorted((name, values.tobytes()) for name, values in row.fields.items())),
-        tuple((id(law), values.tobytes()) for law, values in (*row.laws, *row.frictions)),
+        tuple((id(law), values.tobytes()) for law, values in row.laws),
+        tuple((id(one.law), one.values.tobytes(), one.ways.tobytes()) for one in row.frictions),
         None if row.encoders is None else row.encoders.scale.tobytes(),
         None if row.encoders is None else row.encoders.offset.tobytes(),
         tuple(sorted(row.forces.items())),

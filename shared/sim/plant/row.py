@@ -45,6 +45,17 @@ class FrictionLaw(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class Friction:
+    """A friction law at work in an arm."""
+
+    law: FrictionLaw
+    values: Float64
+    """float64[P]."""
+    ways: Float64
+    """float64[J], over what way it turns round at each joint (rad, m); 0 is at once."""
+
+
 @dataclass
 class JointsReport:
     """What the robot would log."""
@@ -147,9 +158,7 @@ class Row:
     laws: list[tuple[TorqueLaw, Float64]] = dataclasses.field(
         default_factory=list[tuple[TorqueLaw, Float64]]
     )
-    frictions: list[tuple[FrictionLaw, Float64]] = dataclasses.field(
-        default_factory=list[tuple[FrictionLaw, Float64]]
-    )
+    frictions: list[Friction] = dataclasses.field(default_factory=list[Friction])
     rests: dict[str, Rest] = dataclasses.field(default_factory=dict[str, Rest])
     speeds: dict[str, float] = dataclasses.field(default_factory=dict[str, float])
     """Of added joints at time 0 (rad/s); 0 of the others."""
@@ -267,10 +276,18 @@ class Row:
         """Let a law act on this arm: float64[P] are its parameters."""
         self.laws.append((law, np.asarray(values, np.float64)))
 
-    def friction(self, law: FrictionLaw, values: Float64) -> None:
-        """Let joints of this arm rub by a law: float64[P] are its parameters."""
+    def friction(self, law: FrictionLaw, values: Float64, ways: Float64) -> None:
+        """Let joints of this arm rub by a law.
+
+        Args:
+            law: how much.
+            values: float64[P], its parameters.
+            ways: float64[J], over what way it turns round at each joint (rad, m); 0 is at once.
+        """
         self.field("dof_frictionloss")
-        self.frictions.append((law, np.asarray(values, np.float64)))
+        if ways.any():
+            self.field("dof_damping")
+        self.frictions.append(Friction(law, values, ways))
 
     def on_joints(self, change: Callable[[JointsReport], None]) -> None:
         """Change what the robot logs of its joints."""

@@ -77,7 +77,7 @@ def test_what_is_not_in_the_catalogue_is_not_called_what_is_most_like_it(without
         return
     assert (verdict.verdict, causes) == ("unexplained", []), verdict.sentence
     assert "Nearest comes encoder offset of elbow" in verdict.sentence
-    assert "which is not noise" in verdict.sentence
+    assert "fit what it leaves by more than chance" in verdict.sentence
 
 
 def tied_with_base(hidden: tuple[str, int]) -> tuple[Verdict, Tie]:

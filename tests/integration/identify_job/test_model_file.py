@@ -118,7 +118,7 @@ def test_what_is_measured_wrongly_is_said_and_moves_nothing(tmp_path: Path) -> N
 
 def test_a_torque_law_is_left_out_and_said_so(tmp_path: Path) -> None:
     dataset = pr2_dataset(tmp_path)
-    law = cause("load_friction", "elbow_flex", "share", 0.3)
+    law = cause("load_friction", "elbow_flex", "share", 0.3, bend=1e-3)
     file = model_file(dataset, verdict_of(dataset, law))
     assert [each.is_carried for each in file.carried] == [False]
     assert "cannot hold it" in file.carried[0].sentence
@@ -126,7 +126,7 @@ def test_a_torque_law_is_left_out_and_said_so(tmp_path: Path) -> None:
 
 
 PENDULUM_CAUSES = (
-    cause("coulomb_friction", "elbow", "level", 0.1),
+    cause("coulomb_friction", "elbow", "level", 0.1, bend=0.0),
     cause("torque_bias", "shoulder", "torque", 0.3),
     cause("payload", "", "mass", 0.3),
     cause("joint_elasticity", "elbow", "compliance", 0.05),
@@ -148,6 +148,21 @@ def test_the_file_of_an_mjcf_moves_as_its_extended_model(tmp_path: Path, named: 
     found = moved(written(tmp_path, file, dataset))
     assert np.abs(wanted - plain).max() > 5e-3
     np.testing.assert_allclose(found, wanted, atol=1e-6)
+
+
+@pytest.mark.parametrize("details", [{}, {"bend": 1e-3}])
+def test_of_friction_that_bends_the_file_has_its_level_and_says_so(
+    tmp_path: Path, details: dict[str, float]
+) -> None:
+    """A verdict from before friction could bend has no such number."""
+    dataset = pendulum_dataset(tmp_path)
+    level = cause("coulomb_friction", "elbow", "level", 0.1, **details)
+    file = model_file(dataset, verdict_of(dataset, level))
+    told = file.carried[0]
+    assert told.is_carried
+    assert told.sentence.endswith("its bend the file cannot hold" if details else "friction loss")
+    at_once = cause("coulomb_friction", "elbow", "level", 0.1, bend=0.0)
+    assert file.text == model_file(dataset, verdict_of(dataset, at_once)).text
 
 
 def test_the_file_of_an_mjcf_keeps_what_the_original_has(tmp_path: Path) -> None:

@@ -57,6 +57,26 @@ def test_coulomb_friction_holds_what_is_below_its_level(tmp_path: Path) -> None:
     assert np.abs(reports.q).max() < 2e-4  # 0.95 rad without
 
 
+def test_bristles_hold_what_friction_does_and_slide_as_it_does(tmp_path: Path) -> None:
+    subject = _turntable(tmp_path)
+    for bend in (1e-7, 1e-5, 1e-3):  # the first are far too stiff for a step
+        held = replay(subject, recorded([0.1], 2.0, [0.0]), COULOMB, "turn", [0.2, bend])
+        assert 0.0 < np.abs(held.q).max() < 4.0 * bend + 3e-5
+        speeds = _after(subject, 0.5, 1.0, COULOMB, 0.2, bend)
+        np.testing.assert_allclose(np.diff(speeds)[20:] / 0.01, 3.0, rtol=2e-3)
+
+
+def test_a_joint_moves_a_little_before_bristles_let_it_slide(tmp_path: Path) -> None:
+    subject, bend = _turntable(tmp_path, 'damping="0.5"'), 5e-3
+
+    def rising(at: Float64) -> Float64:
+        return np.minimum(0.05 * at, 0.15)[:, None]  # so slowly that the damping does little
+
+    q = replay(subject, recorded(rising, 4.0, [0.0]), COULOMB, "turn", [0.2, bend]).q[:, 0]
+    # dz/dq = (1 - z) / bend, where 0.2 z is the torque
+    assert q[-1] == pytest.approx(-bend * np.log(1.0 - 0.15 / 0.2), rel=0.1)
+
+
 def test_coulomb_and_viscous_friction_sit_only_where_the_model_has_none(tmp_path: Path) -> None:
     bare = _turntable(tmp_path)
     assert COULOMB.places(bare) == VISCOUS.places(bare) == ("turn",)
@@ -98,16 +118,16 @@ def test_asymmetric_friction_adds_one_way_what_it_takes_the_other(
 
 def test_stribeck_friction_sticks_up_to_its_sum_with_coulomb(tmp_path: Path) -> None:
     subject = _turntable(tmp_path, 'frictionloss="0.2"')
-    held = replay(subject, recorded([0.28], 1.0, [0.0]), STRIBECK, "turn", [0.1, 0.2])
+    held = replay(subject, recorded([0.28], 1.0, [0.0]), STRIBECK, "turn", [0.1, 0.2, 0.0])
     assert np.abs(held.q).max() < 2e-4
-    slid = replay(subject, recorded([0.32], 1.0, [0.0]), STRIBECK, "turn", [0.1, 0.2])
+    slid = replay(subject, recorded([0.32], 1.0, [0.0]), STRIBECK, "turn", [0.1, 0.2, 0.0])
     assert slid.q[-1, 0] > 0.1
 
 
 def test_stribeck_friction_falls_with_speed_as_its_curve(tmp_path: Path) -> None:
     subject = _turntable(tmp_path)
     excess, falloff, torque = 0.1, 0.5, 0.12
-    speeds = _after(subject, torque, 3.0, STRIBECK, excess, falloff)
+    speeds = _after(subject, torque, 3.0, STRIBECK, excess, falloff, 0.0)
     middle = 0.5 * (speeds[1:] + speeds[:-1])
     wanted = (torque - excess * np.exp(-((middle / falloff) ** 2))) / _INERTIA
     np.testing.assert_allclose(np.diff(speeds) / 0.01, wanted, atol=0.01)
@@ -117,7 +137,7 @@ def test_stribeck_friction_falls_with_speed_as_its_curve(tmp_path: Path) -> None
 def test_load_friction_is_a_share_of_what_the_drive_gives(tmp_path: Path) -> None:
     subject = _turntable(tmp_path)
     for torque in (0.5, 1.0):
-        speeds = _after(subject, torque, 0.5, LOAD, 0.2)
+        speeds = _after(subject, torque, 0.5, LOAD, 0.2, 0.0)
         np.testing.assert_allclose(np.diff(speeds) / 0.01, 0.8 * torque / _INERTIA, rtol=2e-3)
 
 

@@ -25,8 +25,8 @@ def test_the_arm_as_it_is_lacks_nothing_and_without_friction_it_lacks_that(tmp_p
     space = Space(problem, candidates(problem, *TRUTH))
     right = np.zeros(space.size)
     for each in space.candidates:
-        (quantity,) = each.effect.quantities(problem.subject, each.place)
-        right[space.where(each)] = TRUTH[each.effect.name][each.place] / quantity.probe
+        quantity = each.effect.quantities(problem.subject, each.place)[0]
+        right[space.where(each).start] = TRUTH[each.effect.name][each.place] / quantity.probe
     smooth = right.copy()
     for each in space.candidates:
         if each.effect.name == "coulomb_friction":

@@ -93,9 +93,11 @@ def test_a_cause_is_there_if_what_is_sure_of_it_does_something(
     candidate = Candidate(effect, place)
     grown, train = space.grown(candidate), space.problem.of("train")
     fit = polish(grown, np.zeros(grown.size), train, 2)
-    widths = CALIBRATED * half_widths(fit, train)[-2:]
+    own = slice(space.size, space.size + 2)
+    widths = CALIBRATED * half_widths(fit, train)[own]
     for sure, expected in (((0.0, 0.0), False), ((0.0, 10.0), is_enough), ((10.0, 0.0), True)):
-        z = np.r_[fit.z[:-2], np.array(sure) * np.maximum(widths, 0.1)]
+        z = fit.z.copy()
+        z[own] = np.array(sure) * np.maximum(widths, 0.1)
         assert is_there(replace(fit, z=z), candidate, train) == expected
 
 

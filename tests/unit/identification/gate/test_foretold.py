@@ -41,7 +41,7 @@ class Looked:
     @functools.cache  # noqa: B019
     def after(self, candidate: Candidate) -> Fit:
         grown = self.before.space.grown(candidate)
-        return polish(grown, np.r_[self.before.z, 0.5], self.problem.of("train"), 4)
+        return polish(grown, np.r_[self.before.z, 0.5, 1.0], self.problem.of("train"), 4)
 
     def follow(self, candidate: Candidate) -> Foretold:
         return self.held.follow(self.before.variant, self.after(candidate).variant)

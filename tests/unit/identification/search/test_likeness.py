@@ -12,7 +12,7 @@ from shared.identification.catalogue.tracker_frame import EFFECT as TRACKER_FRAM
 from shared.identification.effect import Candidate
 from shared.identification.fitting.fit import polish
 from shared.identification.fitting.space import Space
-from shared.identification.search.likeness import is_only_like
+from shared.identification.search.likeness import why_only_like
 from shared.identification.search.searched import Search
 from shared.sim.plant.row import Row
 from tests.measured import measure, plain, problem_of
@@ -51,34 +51,34 @@ def named(searches: Searches, *candidates: Candidate, is_event: bool = False) ->
     return found
 
 
-def test_a_cause_that_leaves_what_another_would_explain_is_only_like_it(searches: Searches):
-    assert is_only_like(named(searches, TORQUE))
+def test_a_cause_that_leaves_what_another_would_explain_why_only_like_it(searches: Searches):
+    assert why_only_like(named(searches, TORQUE))
 
 
 def test_a_cause_is_the_law_where_no_other_explains_what_it_leaves(searches: Searches):
     found = named(searches, TORQUE, DRAG)
     found.candidates = (*found.candidates, SPRING)
-    assert not is_only_like(found)
+    assert not why_only_like(found)
 
 
 def test_of_causes_at_other_joints_nothing_is_asked(searches: Searches):
     found = named(searches, TORQUE)
     found.candidates = (TORQUE, Candidate(NONLINEAR, "lift"))
-    assert not is_only_like(found)
+    assert not why_only_like(found)
 
 
 def test_of_what_is_at_no_joint_nothing_is_asked(searches: Searches):
     found = named(searches, TILT)
     found.candidates = (TILT, Candidate(TOOL_OFFSET, ""), Candidate(TRACKER_FRAME, ""))
-    assert not is_only_like(found)
+    assert not why_only_like(found)
 
 
 def test_of_what_happened_once_nothing_is_asked(searches: Searches):
-    assert not is_only_like(named(searches, TORQUE, is_event=True))
+    assert not why_only_like(named(searches, TORQUE, is_event=True))
 
 
 def test_nothing_is_asked_where_no_repeat_says_what_noise_is(searches: Searches):
     found = named(searches, TORQUE)
     assert found.problem.noise.is_white
     found.problem = plain(found.problem)
-    assert not is_only_like(found)
+    assert not why_only_like(found)

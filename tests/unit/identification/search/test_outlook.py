@@ -43,7 +43,7 @@ def seen(found: Search) -> dict[Candidate, Screened]:
 @pytest.fixture(scope="module")
 def small() -> Search:
     """Return a search for a cause of little more than 1 % of the residual."""
-    return begun("load_friction@shoulder=0.03")
+    return begun("load_friction@shoulder=0.028")
 
 
 def test_a_small_cause_has_a_prospect_and_most_of_what_is_not_there_has_none(small: Search):

@@ -48,7 +48,7 @@ def test_friction_and_gains_are_those_of_the_row(tmp_path: Path) -> None:
     ("name", "values", "wanted"),
     [
         ("asymmetric_friction", [0.4], 0.4 * 0.3),  # of a speed of 0.3 rad/s, the same either way
-        ("load_friction", [0.1], 0.1 * 5.0),  # of the 5 N m that the drive gives; it moves on
+        ("load_friction", [0.1, 0.0], 0.1 * 5.0),  # of the 5 N m that the drive gives; it moves on
         ("torque_gain", [-0.2], 0.2 * 5.0),
     ],
 )

@@ -21,7 +21,7 @@ def heavier(row: Row) -> None:
 
 def loaded(row: Row) -> None:
     """Let a law act at every step."""
-    LOADED.enter(row, "elbow", np.array([0.1]))
+    LOADED.enter(row, "elbow", np.array([0.1, 1e-3]))
 
 
 @pytest.mark.parametrize("entries", [(nothing, heavier), (nothing, heavier, loaded)])
