@@ -1,10 +1,10 @@
 """A joint's friction is higher when it starts to move than when it moves.
 
 ``F(v) = excess * exp(-(v / falloff)^2)`` on top of the constant level that the base fit or
-``coulomb_friction`` has (Armstrong-Helouvry 1994, with exponent 2). The level of MuJoCo's own
-friction constraint is set anew before each step, so that the joint really sticks and no step is
-too long for it, nor are bristles (``sim/plant/bristles.py``); MuJoCo's LuGre element (``dcmotor``)
-costs an activation and a compiled model per joint.
+``coulomb_friction`` has (Armstrong-Helouvry 1994, with exponent 2). That is a level set anew before
+each step, of MuJoCo's own friction constraint or of bristles (``sim/plant/bristles.py``), so that
+the joint really sticks and no step is too long for it; MuJoCo's LuGre element (``dcmotor``) costs
+an activation and a compiled model per joint.
 """
 
 import numpy as np

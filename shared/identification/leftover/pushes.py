@@ -142,9 +142,14 @@ def is_one_way(torque: Float64) -> bool:
 
 
 def _is_sudden(torque: Float64, piece: slice, size: float) -> bool:
-    """Return whether a torque is of one sign, and little is missing just before and after."""
+    """Return whether a torque is of one sign, and little is missing just before and after.
+
+    Of one that is there from the begin nothing says that it began.
+    """
     before = np.abs(torque[max(piece.start - 2 * _SMEARED, 0) : max(piece.start - _SMEARED, 0)])
     after = np.abs(torque[piece.stop + _SMEARED : piece.stop + 2 * _SMEARED])
+    if not len(before):
+        return False
     around = [float(np.median(each)) for each in (before, after) if len(each)]
     return is_one_way(torque[piece]) and all(each < _QUIET * size for each in around)
 

@@ -36,7 +36,7 @@ class FrictionLaw(Protocol):
     """Coulomb friction that depends on what the arm does; the solver lets it stick."""
 
     def __call__(self, step: Step, values: Float64) -> Float64:
-        """Return float64[K, J], at least 0, to be added to the joints' friction (N m, N).
+        """Return float64[K, J], to be added to the joints' friction, which is at least 0 (N m, N).
 
         Args:
             step: the state.

@@ -45,6 +45,12 @@ def test_pushes_are_found_in_their_recording_when_they_were(
     assert [each.end - each.begin for each in found] == pytest.approx([0.4] * len(begins), abs=0.1)
 
 
+@pytest.mark.parametrize(("begin", "pushes"), [(0.05, 0), (0.6, 1)])
+def test_what_is_there_from_the_begin_is_no_push(begin: float, pushes: int) -> None:
+    torque = noise(np.random.default_rng(7)) + pulse(begin)
+    assert len(pushes_of([track(0, 20.0 * torque)], [torque[:, None]])) == pushes
+
+
 def test_what_comes_back_at_every_reversal_is_no_push() -> None:
     rng = np.random.default_rng(5)
     tracks = [track(index, np.full(len(_AT), 30.0)) for index in range(2)]
