@@ -378,6 +378,11 @@ def _record_next(conclusion: Conclusion, dataset: Dataset) -> tuple[str, ...]:
             "Log a tracker beside the joints: what gives or lies behind the encoders does not "
             "show without one."
         )
+    if "no_effort" in names and dataset.control == "position" and conclusion.word != "none":
+        out.append(
+            "Log efforts beside the joints, torques or currents: of a servo how strong it is, how "
+            "heavy its load and how much it rubs may all be larger together without them."
+        )
     if conclusion.word in ("unexplained", "base_too_coarse"):
         out.append(
             "Record the whole programme that riposte identify excite designs, joint by joint."
