@@ -44,11 +44,9 @@ class Quantity:
     """Of such a number: whether the law is no longer this one at its lowest and at its highest."""
     least: float = 0.0
     """Below this size, either way, it is no more than what the simulation is off by itself."""
-
-    @property
-    def is_detail(self) -> bool:
-        """Return whether it says how, and there is one place only to look first."""
-        return len(self.grid) == 1
+    is_detail: bool = False
+    """Whether an effect is still what it is without it, at 0, though not quite the arm's: one that
+    says how, with one place to look."""
 
 
 class Effect(Protocol):

@@ -20,4 +20,6 @@ def bend_of(joint: Place) -> Quantity:
     """Return the way (rad, m)."""
     begin = _BEGIN * joint.travel
     low, high = _LEAST * joint.travel, _MOST * joint.travel
-    return Quantity("bend", joint.angle, low, high, begin, grid=(begin,), ends=(False, True))
+    return Quantity(
+        "bend", joint.angle, low, high, begin, grid=(begin,), ends=(False, True), is_detail=True
+    )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from shared.identification.arm.places import moving, place_of
 from shared.identification.dataset.types import Float64
 from shared.identification.fitting.problem import BLOCK, Problem, Variant
+from shared.identification.leftover.happened import comes_back, is_aside
 from shared.identification.leftover.phases import (
     AGAIN,
     AT_TIMES,
@@ -30,7 +31,7 @@ from shared.identification.noise.floor import repeat_differences
 from shared.identification.noise.quiet import OF_PAIR
 from shared.identification.verdict import Unexplained
 from shared.sim.plant.kinematics import tool_poses
-from shared.sim.plant.signals import pose_error, sampled
+from shared.sim.plant.signals import pose_error
 
 LEAST_SIZE = 1.3
 """Of what is listed, in noise floors."""
@@ -46,10 +47,6 @@ _NEAR = 5
 """Blocks that a power is taken over."""
 _AFTER = 50
 """Blocks after a push in which what is off is put down to it."""
-_BACK = 0.3
-"""After a push, in which a joint is off by it, too (s)."""
-_ALIKE = 0.5
-"""Of what a joint is off by, that it differs by from its repeat, if that is off by it, too."""
 _TURN = 1e-4
 """Of a difference quotient (rad, m)."""
 _BY_JOINT = 0.8
@@ -85,12 +82,12 @@ def leftovers(
     found: list[tuple[float, Unexplained]] = []
     pushed: list[tuple[float, Unexplained]] = []
     if joints:
-        happened = [_is_aside(problem, track) for track in joints]
+        happened = [is_aside(problem, track) for track in joints]
         pushes = pushes_of(joints, [missing.of(track) for track in joints], happened)
         pushes = tuple(
             one
             for one in pushes
-            if not _comes_back(problem, joints[one.track], one.joint, one.piece)
+            if not comes_back(problem, joints[one.track], one.joint, one.piece)
         )
         pushed = _pushed(problem, joints, pushes, missing)
         kept = [each for each in known if not any(_is_same(each, one) for _, one in pushed)]
@@ -108,42 +105,6 @@ def leftovers(
     pushed.sort(key=lambda each: -each[0])
     listed = [*found[:MOST], *pushed[:MOST_PUSHES]]
     return tuple(each for _, each in sorted(listed, key=lambda each: -each[0]))
-
-
-def _comes_back(problem: Problem, track: Track, joint: int, piece: slice) -> bool:
-    """Return whether a joint is off by the same when its recording was repeated: no push is.
-
-    Args:
-        problem: has the recordings.
-        track: of the recording.
-        joint: which.
-        piece: blocks in which something pushed, as it looks.
-    """
-    of = problem.dataset.trajectories[track.trajectory]
-    begin, last = float(track.at[piece.start]), float(track.at[piece.stop - 1]) + _BACK
-    shown = (begin <= track.at) & (track.at <= last)
-    off = track.x[shown, joint] * problem.noise.joints[joint]
-    size = float(np.linalg.norm(off)) / max(len(off), 1) ** 0.5
-    own = slice(joint, joint + 1)
-    for other in problem.dataset.trajectories:
-        at = of.joints_at[(begin <= of.joints_at) & (of.joints_at <= last)]
-        if other.repeats != of.name or not len(at) or at[-1] > other.joints_at[-1]:
-            continue
-        first, again = (sampled(each.joints_at, each.q[:, own], at) for each in (of, other))
-        apart: Float64 = first - again
-        if float(np.linalg.norm(apart)) / len(apart) ** 0.5 < _ALIKE * size:
-            return True
-    return False
-
-
-def _is_aside(problem: Problem, track: Track) -> NDArray[np.bool_]:
-    """Return bool[B], which blocks nothing was fitted to, since something happened there."""
-    name = problem.dataset.trajectories[track.trajectory].name
-    spans = [each for each in problem.aside if each.trajectory == name]
-    out = np.zeros(len(track.at), np.bool_)
-    for each in spans:
-        out |= (each.begin <= track.at) & (track.at < each.end)
-    return out
 
 
 class _Missing:
@@ -340,7 +301,7 @@ def _told(
     is_external = False
     if len(pushes) == 1 and (push := pushes[0]) is not None and group.joint is not None:
         is_external = any(
-            is_one_way(each[push]) and not _comes_back(problem, tracks[index], group.joint, push)
+            is_one_way(each[push]) and not comes_back(problem, tracks[index], group.joint, push)
             for index, each in torques.items()
         )
         phase = Phase(ONCE)  # where friction holds, the arm stays off when the push is over

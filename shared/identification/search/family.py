@@ -48,7 +48,7 @@ def relatives(candidates: Sequence[Candidate], of: Candidate, fit: Fit) -> tuple
     if of.place not in subject.joints:
         return ()
     quantities = of.effect.quantities(subject, of.place)
-    if any(len(each.grid) > 1 or not each.is_smooth for each in quantities):
+    if any((each.grid and not each.is_detail) or not each.is_smooth for each in quantities):
         return ()
     left = tuple(
         each for each in candidates if each.effect.name == of.effect.name and each not in taken

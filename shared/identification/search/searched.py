@@ -267,11 +267,16 @@ def why_open(found: Search) -> str:
 
     Numbers are root mean squares, in noise floors.
     """
-    if not (found.accepted and is_open(found)):
+    if not found.accepted:
         return ""
-    left, is_told = found.left, True
-    if not _is_much(found, left):
-        left, is_told = found.plainly, False
+    if _is_much(found, left := found.left):
+        return _why_much(found, left, is_told=True)
+    if _is_much(found, left := found.plainly):
+        return _why_much(found, left, is_told=False)
+    return ""
+
+
+def _why_much(found: Search, left: Left, is_told: bool) -> str:
     if left.current >= left.nominal:
         return f"and the model file as it is {left.nominal**0.5:.2f}"
     if is_told and left.current >= left.base:

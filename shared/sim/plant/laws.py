@@ -63,37 +63,40 @@ class Rubbing:
 def torques_of(rows: Sequence[Row]) -> list[Active]:
     """Return the torques at work, each with the arms that it acts on."""
     return [
-        Active(law, rows_of(members), np.stack(values), np.zeros((len(members), law.memory)))
+        Active(law, _indices(members), np.stack(values), np.zeros((len(members), law.memory)))
         for law, members, values in _by_law([(row, row.laws) for row in rows])
     ]
 
 
 def frictions_of(rows: Sequence[Row]) -> list[Rubbing]:
     """Return the frictions at work, each with the arms that it acts on."""
-    speeds = {row.index: row.initial_qd for row in rows}
     found: list[Rubbing] = []
     for law, members, each in _by_law(
         [(row, [(one.law, one) for one in row.frictions]) for row in rows]
     ):
         ways = np.stack([one.ways for one in each])
-        speed = np.stack([speeds[member] for member in members])
+        speed = np.stack([row.initial_qd for row in members])
         bristles = Bristles(ways, speed) if ways.any() else None
         values = np.stack([one.values for one in each])
-        found.append(Rubbing(law, rows_of(members), values, bristles))
+        found.append(Rubbing(law, _indices(members), values, bristles))
     return found
+
+
+def _indices(rows: Sequence[Row]) -> Rows:
+    return rows_of([row.index for row in rows])
 
 
 def _by_law(
     rows: Sequence[tuple[Row, list[tuple[_Law, _Kept]]]],
-) -> list[tuple[_Law, list[int], list[_Kept]]]:
+) -> list[tuple[_Law, list[Row], list[_Kept]]]:
     """Return each law with its arms and what they gave it; several times if an arm did so."""
-    groups: dict[tuple[_Law, int], list[tuple[int, _Kept]]] = defaultdict(list)
+    groups: dict[tuple[_Law, int], list[tuple[Row, _Kept]]] = defaultdict(list)
     for row, laws in rows:
         seen: dict[_Law, int] = defaultdict(int)
         for law, kept in laws:
-            groups[law, seen[law]].append((row.index, kept))
+            groups[law, seen[law]].append((row, kept))
             seen[law] += 1
     return [
-        (law, [index for index, _ in group], [kept for _, kept in group])
+        (law, [row for row, _ in group], [kept for _, kept in group])
         for (law, _), group in groups.items()
     ]

@@ -43,12 +43,12 @@ def screened(folder: Path, effect: Effect, values: list[float]) -> tuple[Screene
 
 
 def test_a_form_is_tried_where_its_grid_says_and_the_size_is_found_with_it(tmp_path: Path) -> None:
-    best, (excess, falloff, bend) = screened(tmp_path, STRIBECK, [0.4, 0.2, 3e-4])
+    best, (excess, falloff, bend) = screened(tmp_path, STRIBECK, [0.4, 0.2, 8e-4])
     assert best.candidate.label == "stribeck_friction elbow"
     assert excess == pytest.approx(0.4, rel=0.5)
     assert 0.05 < falloff < 0.6
     assert 0.0 < bend < 1e-3
-    assert best.share > 0.04  # most of the rest is noise
+    assert best.share > 0.05  # most of the rest is noise
 
 
 def test_a_spring_is_found_with_a_rest_in_the_joints_range(tmp_path: Path) -> None:
