@@ -155,6 +155,7 @@ def _train(
         stop,
         again=f"riposte train --resume --out {folder}",
         view=view,
+        awaited=("recorder",) if settings.train.record else (),
     )
 
 

@@ -20,7 +20,7 @@ from shared.bus.config import BusConfig
 from shared.bus.ports import free_port
 from shared.clock import Clock, SystemClock
 from shared.errors import ConfigError, RiposteError
-from shared.messages.topics import SCHEDULE
+from shared.messages.topics import SCHEDULE, Role
 from shared.runtime.incidents import Incidents
 from shared.telemetry.door import read_live_view
 
@@ -38,6 +38,8 @@ ROUTER_SECONDS = 60.0
 """How long the router may take to come up on a busy machine."""
 HAND_OVER_SECONDS = 5.0
 """How long the end of a run waits for its last incidents to be entered."""
+STARTING_SECONDS = 20.0
+"""How long the end of a run waits for a process that is still starting."""
 
 
 class StopAsked(Exception):  # noqa: N818 - it is no error
@@ -67,6 +69,7 @@ def run_processes(
     *,
     again: str,
     view: bool = False,
+    awaited: Sequence[Role] = (),
 ) -> None:
     """Start processes, watch them until the schedule is done, stop them in order.
 
@@ -80,6 +83,7 @@ def run_processes(
         stop: set when the person at the terminal asks to stop.
         again: the command that continues the run.
         view: open the live view in a browser.
+        awaited: roles that are to have begun before a run ends, however short it is.
 
     Raises:
         StopAsked: ``stop`` was set.
@@ -110,6 +114,7 @@ def run_processes(
                     webbrowser.open(live.url)
                 bus.wait(POLL_SECONDS)
             watcher.hand_over()
+            watcher.await_begun(awaited)
     finally:
         for event in supervisor.stop():
             log.info("process_stopped", process=event.name, exit_code=event.exit_code)
@@ -207,6 +212,17 @@ class _Watcher:
         deadline = self._clock.now() + HAND_OVER_SECONDS
         while self._incidents.unacknowledged and self._clock.now() < deadline:
             self._incidents.pump()
+            self._bus.wait(POLL_SECONDS)
+
+    def await_begun(self, roles: Sequence[Role]) -> None:
+        """Give processes that are still starting the time to begin their files.
+
+        Raises:
+            RiposteError: see ``tick``.
+        """
+        deadline = self._clock.now() + STARTING_SECONDS
+        while not all(map(self._bus.alive, roles)) and self._clock.now() < deadline:
+            self.tick()
             self._bus.wait(POLL_SECONDS)
 
     def tell(self, events: Sequence[ProcessEvent]) -> None:

@@ -1,6 +1,8 @@
 """Whole runs of real processes: to the end, interrupted and resumed, on a full disk."""
 
 import json
+import os
+import shutil
 import signal
 import subprocess
 from collections.abc import Iterator
@@ -37,6 +39,17 @@ def disk(tmp_path: Path) -> Iterator[Path]:
         yield disk
 
 
+@pytest.fixture
+def late_recorder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What gives way to the rest of a run comes up after its schedule is done."""
+    nice = tmp_path / "bin" / "nice"
+    nice.parent.mkdir()
+    nice.write_text(f'#!/bin/sh\nsleep 8; exec {shutil.which("nice")} "$@"\n')
+    nice.chmod(0o755)
+    monkeypatch.setenv("PATH", str(nice.parent), prepend=os.pathsep)
+
+
+@pytest.mark.usefixtures("late_recorder")
 def test_a_run_ends_with_a_report_and_leaves_no_process(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     code, out, err = train(folder, seconds=240)
