@@ -26,6 +26,11 @@ COARSE: Final = 1e-3
 SLOWEST_HZ: Final = 40.0
 FASTER: Final = 1.5
 """Times the fastest motion that is fitted to: what is held out says nothing of the fit then."""
+MOVES: Final = 0.05
+"""Of the fastest motion: what is slower stands."""
+ONE_SPEED: Final = 0.6
+"""Of the speed of four fifths of a motion: as fast is four fifths of it, too, that has one speed.
+Of a sine it is a third."""
 JUMP_SPEED: Final = 10.0
 """Of a tracker (m/s)."""
 JUMP: Final = 0.03
@@ -209,7 +214,7 @@ def of_set(
 
 
 def _excitation(trajectories: Sequence[Trajectory], joints: Sequence[str]) -> list[Caveat]:
-    """Return ``little_excitation`` and ``faster_test``."""
+    """Return ``little_excitation``, ``one_speed`` and ``faster_test``."""
     found: list[Caveat] = []
     train = [each for each in trajectories if each.split == "train"]
     held_out = [each for each in trajectories if each.split == "test"]
@@ -229,13 +234,33 @@ def _excitation(trajectories: Sequence[Trajectory], joints: Sequence[str]) -> li
                 f"the train recordings; its friction, inertia and gain need over {LEAST_RANGE} and "
                 f"{LEAST_SPEED}: record a motion of it"
             )))  # fmt: skip
+            continue
+        slow, fast = _usual_speeds(np.concatenate([_speeds(each, index) for each in train]))
+        if slow > ONE_SPEED * fast:
+            found.append(Caveat("one_speed", "", (
+                f"joint {joint!r} goes at {slow:.2g} to {fast:.2g} rad/s (m/s) for most of the "
+                "time that it moves in the train recordings: dry and viscous friction are not "
+                "told apart by that, nor what falls off with speed; record slow motion, too"
+            )))  # fmt: skip
     return found
 
 
+def _usual_speeds(speeds: Float64) -> tuple[float, float]:
+    """Return between which speeds three fifths of a motion are, where it moves."""
+    moving = speeds[speeds > MOVES * speeds.max()]
+    slow, fast = np.quantile(moving, [0.2, 0.8])
+    return float(slow), float(fast)
+
+
 def _speed(trajectory: Trajectory, index: int) -> float:
-    """Return the speed of a joint that is passed on a hundredth of the way, over some 50 ms."""
+    """Return the speed of a joint that is passed on a hundredth of the way."""
+    speeds = _speeds(trajectory, index)
+    return float(np.quantile(speeds, 0.99)) if len(speeds) else 0.0
+
+
+def _speeds(trajectory: Trajectory, index: int) -> Float64:
+    """Return the speeds of a joint, each over some 50 ms (rad/s, m/s)."""
     times = trajectory.joints_at
     stride = max(1, min(round(0.05 / float(np.median(np.diff(times)))), (len(times) - 1) // 4))
     marks = np.arange(0, len(times), stride)
-    speeds = np.abs(np.diff(trajectory.q[marks, index]) / np.diff(times[marks]))
-    return float(np.quantile(speeds, 0.99)) if len(speeds) else 0.0
+    return np.abs(np.diff(trajectory.q[marks, index]) / np.diff(times[marks]))

@@ -205,6 +205,21 @@ def test_a_held_out_motion_much_faster_than_what_is_fitted_to_is_told(tmp_path):
     assert "joint 'elbow' goes at up to" in found.text
 
 
+def test_joints_that_go_at_one_speed_are_told(tmp_path):
+    folder = written(tmp_path)
+    assert "one_speed" not in {each.name for each in read_dataset(folder).caveats}
+    for number in (0, 1):
+        even = motion(number)
+        count = len(even["q_elbow"])
+        way = np.minimum(np.arange(count), count // 2)
+        even["q_elbow"] = even["q_elbow"][0] + 0.01 * way
+        even.pop("qd_elbow")
+        even.pop("qd_shoulder")
+        rewritten(folder, number, even)
+    found = the(folder, "one_speed")
+    assert found.text.startswith("joint 'elbow' goes at 1 to 1 rad/s (m/s)")
+
+
 def test_what_recordings_share_but_for_its_numbers_is_said_once():
     def of(trajectory: str, text: str) -> Caveat:
         return Caveat("any", trajectory, text)

@@ -27,6 +27,16 @@ def test_readings_without_steps_have_none():
     assert step_of(np.zeros(600)) == 0.0
 
 
+def test_an_even_speed_is_no_step():
+    ramp = 1.05 * 0.015 * np.arange(200.0)
+    rng = np.random.default_rng(2)
+    assert step_of(ramp) == 0.0
+    assert step_of(ramp + 1e-3 * rng.standard_normal(200)) == 0.0
+    fine = np.round((ramp + 2e-5 * rng.standard_normal(200)) / 6e-6) * 6e-6
+    assert step_of(fine) == 0.0
+    assert step_of(np.r_[np.zeros(50), fine, np.full(50, fine[-1])]) == 0.0
+
+
 def test_of_several_recordings_the_widest_counts():
     coarse = np.round(SWING / 0.01) * 0.01
     found = steps_of([np.c_[SWING, coarse], np.c_[coarse, np.zeros(600)]])
