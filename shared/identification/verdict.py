@@ -45,7 +45,8 @@ class Cause(_Part, frozen=True, kw_only=True):
     other_intervals: dict[str, Interval] = {}
     """Of those that say how much, not how; older verdicts do not say."""
     share: float = 0.0
-    """Of the explainable held-out residual that it removes by itself."""
+    """Of the explainable held-out residual, what is left more without it, all else fitted anew. Of
+    one that is not told from another: what it takes off by itself."""
     share_interval: Interval | None = None
 
 

@@ -154,7 +154,7 @@ def _cause(cause: Cause) -> Html:
             )
             for name, value in told.others.items()
         ),
-        ("explains by itself", words.share_text(cause.share, cause.share_interval)),
+        ("left more without it", words.share_text(cause.share, cause.share_interval)),
     ]
     where = f" at {cause.where}" if cause.where else ""
     title = cause.title[:1].upper() + cause.title[1:]

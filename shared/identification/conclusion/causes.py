@@ -1,9 +1,13 @@
 """The causes that a search took, with their sizes, and what is not told from them."""
 
+import numpy as np
+
 from shared.identification.conclusion.sentence import label
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Candidate
 from shared.identification.gate.certainty import CALIBRATED, half_widths
+from shared.identification.gate.held_out import Gain, compare
+from shared.identification.search.fewer import without
 from shared.identification.search.searched import Search, Tried, cosine
 from shared.identification.verdict import Cause, Interval, Tie
 
@@ -23,11 +27,27 @@ def causes_of(found: Search, widths: Float64) -> tuple[Cause, ...]:
         count = len(values)
         sizes[candidate] = (values, widths[begin : begin + count])
         begin += count
-    return tuple(_cause(found, each, *sizes[each.candidate], base) for each in found.accepted)
+    return tuple(
+        _cause(found, each.candidate, *sizes[each.candidate], gain, base)
+        for each, gain in zip(found.accepted, _gains(found), strict=True)
+    )
 
 
-def _cause(found: Search, tried: Tried, values: Float64, widths: Float64, base: float) -> Cause:
-    candidate = tried.candidate
+def _gains(found: Search) -> list[Gain]:
+    """Return what each accepted cause takes off what all the others leave."""
+    if len(found.accepted) == 1:
+        return [found.accepted[0].gain]
+    train, test = found.problem.of("train"), found.problem.of("test")
+    rng = np.random.default_rng(0)
+    return [
+        compare(without(found, each, train, test).losses, found.current_losses, rng)
+        for each in found.accepted
+    ]
+
+
+def _cause(
+    found: Search, candidate: Candidate, values: Float64, widths: Float64, gain: Gain, base: float
+) -> Cause:  # fmt: skip
     quantities = candidate.effect.quantities(found.problem.subject, candidate.place)
     forms = candidate.forms(found.problem.subject)
     ends = [
@@ -35,7 +55,7 @@ def _cause(found: Search, tried: Tried, values: Float64, widths: Float64, base: 
         for each, value, width in zip(quantities, values, widths, strict=True)
     ]
     first = quantities[0]
-    low, high = tried.gain.share_interval(base)
+    low, high = gain.share_interval(base)
     return Cause(
         effect=candidate.effect.name,
         where=candidate.place,
@@ -55,7 +75,7 @@ def _cause(found: Search, tried: Tried, values: Float64, widths: Float64, base: 
             for each, own, is_form in zip(quantities[1:], ends[1:], forms[1:], strict=True)
             if not is_form
         },
-        share=tried.gain.share(base),
+        share=gain.share(base),
         share_interval=Interval(low=low, high=high),
     )
 
@@ -68,7 +88,7 @@ def rival(found: Search, tried: Tried, base: float) -> Cause:
     """Return a cause that was not taken, with its sizes in its own fit."""
     widths = half_widths(tried.fit, found.problem.of("train"))
     values = tried.fit.space.values(tried.fit.z)[-1]
-    return _cause(found, tried, values, widths[-len(values) :], base)
+    return _cause(found, tried.candidate, values, widths[-len(values) :], tried.gain, base)
 
 
 def ties_of(found: Search, causes: tuple[Cause, ...]) -> tuple[Tie, ...]:

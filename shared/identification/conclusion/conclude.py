@@ -6,11 +6,11 @@ import numpy as np
 
 from shared.identification.conclusion.causes import causes_of, ties_of
 from shared.identification.conclusion.limits import limits_of
-from shared.identification.conclusion.sentence import sentence_of, with_far
+from shared.identification.conclusion.sentence import sentence_of, with_base, with_far
 from shared.identification.dataset.types import Float64
 from shared.identification.fitting.problem import Variant
 from shared.identification.gate.certainty import half_widths, is_there
-from shared.identification.gate.held_out import compare, floor_of
+from shared.identification.gate.held_out import LEAST_SHARE, compare, floor_of
 from shared.identification.search.bent import ties_with_base
 from shared.identification.search.far import far_from_file
 from shared.identification.search.searched import (
@@ -70,16 +70,17 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
     told = accepted if word == "unexplained" else sure
     not_believed = why_open(found) or f"and {found.only_like}"
     sentence = sentence_of(word, told, ties, held_out, left, not_believed, found.doubted)
-    far = far_from_file(found)
+    far, base = far_from_file(found), _base(found, widths)
+    further = with_far(sentence, word, far) if far else with_base(sentence, word, base, held_out)
     return Conclusion(
         word=word,
-        sentence=with_far(sentence, word, far),
+        sentence=further,
         causes=sure if word in ("named", "tie") else (),
         ties=ties if word == "tie" else (),
         held_out=held_out,
         candidates=_scored(found, word),
         limits=limits_of(found) if word in ("named", "none", "tie") else (),
-        base=_base(found, widths),
+        base=base,
         far=far,
     )
 
@@ -216,10 +217,19 @@ def _why_not(
     if label in rivals:
         return f"does as well as what was taken, within {ALIKE:.0%} of the gain or its error"
     if tried.gain.surely <= 0.0 and tried.gain.apart is None:
+        if tried.gain.gain >= LEAST_SHARE * base:
+            return "better on held-out recordings, of which there are too few to be sure"
         return "no better on held-out recordings"
     if not tried.gain.is_useful(base):
         return "better, but by too little to be of use"
+    if _does_as_well(tried, found):
+        return "does as well as what was taken, but its size may be anything"
     return "explained better by what was taken"
+
+
+def _does_as_well(tried: Tried, found: Search) -> bool:
+    taken = [one.gain.gain for one in found.accepted]
+    return len(taken) == 1 and tried.gain.gain >= (1.0 - ALIKE) * taken[0]
 
 
 def _base(found: Search, widths: Float64) -> tuple[BaseValue, ...]:

@@ -1,16 +1,29 @@
 """Says in a sentence or two what a search comes to."""
 
 import math
+from collections.abc import Sequence
 
 import msgspec
 
 from shared.identification.leftover.phases import AGAIN
 from shared.identification.search.searched import NEARLY_NOISE
-from shared.identification.verdict import Cause, HeldOut, Interval, Tie, Unexplained, Word
+from shared.identification.verdict import (
+    BaseValue,
+    Cause,
+    HeldOut,
+    Interval,
+    Tie,
+    Unexplained,
+    Word,
+)
 from shared.telemetry.wording import listing, scaled
 
 _WAY = frozenset("xyz")
 """Numbers that are a way in space."""
+_MENDED = 1.2
+"""Times what the base fit leaves, that a file has to leave to be said to be other than the arm."""
+_TOLD = 3
+"""Numbers of the base that are told of."""
 
 
 def sentence_of(
@@ -93,6 +106,43 @@ def with_far(sentence: str, word: Word, far: str) -> str:
     if not far or word not in ("none", "unexplained"):
         return sentence
     return f"{sentence} {far[0].upper()}{far[1:]}."
+
+
+def with_base(sentence: str, word: Word, base: Sequence[BaseValue], held_out: HeldOut) -> str:
+    """Return a verdict for people with what its base fit mended, where there is nothing to name.
+
+    Args:
+        sentence: the verdict.
+        word: the same, in one.
+        base: its numbers; told are those that are surely not the file's, surest first.
+        held_out: how much the file and the base fit leave.
+    """
+    if word != "none" or held_out.nominal < _MENDED * held_out.base_fit:
+        return sentence
+    sure = [each for each in base if _is_other(each)]
+    sure.sort(key=_errors_off, reverse=True)
+    if not sure:
+        return sentence
+    told = listing([_changed(each) for each in sure[:_TOLD]])
+    more = f" and {len(sure) - _TOLD} more" if len(sure) > _TOLD else ""
+    return (
+        f"{sentence} The file's own numbers are at {held_out.nominal:.2f}; the fit has other ones, "
+        f"surest {told}{more}."
+    )
+
+
+def _is_other(each: BaseValue) -> bool:
+    return bool(each.nominal) and not each.interval.low <= each.nominal <= each.interval.high
+
+
+def _errors_off(each: BaseValue) -> float:
+    half = 0.5 * (each.interval.high - each.interval.low)
+    return abs(each.extended - each.nominal) / max(half, 1e-300)
+
+
+def _changed(each: BaseValue) -> str:
+    unit = f" {each.unit}" if each.unit else ""
+    return f"{each.name} {each.extended:.3g}{unit} for {each.nominal:.3g}"
 
 
 def _by_all(held_out: HeldOut) -> str:

@@ -85,7 +85,9 @@ def otherwise(found: Search, progress: Progress) -> Otherwise | None:
         is_sure = is_there(fit, each.candidate, train)
         if is_sure and _brings_back(base, fit) and not is_worse(losses, found.base_losses):
             gain = compare(found.base_losses, losses, np.random.default_rng(0))
-            tried.append(Tried(each, fit, gain, losses))
+            one = Tried(each, fit, gain, losses)
+            if not (one.is_of_the_simulation or one.is_of_another_law):
+                tried.append(one)
     if not tried:
         return None
     tried.sort(key=lambda each: each.gain.loss)

@@ -131,6 +131,24 @@ def _is_alike(
     return margin.gain < max(margin.error, ALIKE * best.gain.gain)
 
 
+def as_well(taken: Tried, others: list[Tried], rng: np.random.Generator) -> tuple[Tried, ...]:
+    """Return those of other causes that all recordings do not tell from what is taken.
+
+    Args:
+        taken: the cause that is taken.
+        others: that pass, too, though their size may be anything.
+        rng: random numbers.
+    """
+    left = {one.candidate: one.everywhere() for one in (taken, *others)}
+    return tuple(
+        one
+        for one in others
+        if one.numbers <= taken.numbers
+        and _is_alike(taken, one, left, rng)
+        and not _outdoes(taken, one, False, rng)
+    )
+
+
 def is_rival(
     found: Search, best: Tried, other: Tried, train: tuple[int, ...], test: tuple[int, ...]
 ) -> bool:

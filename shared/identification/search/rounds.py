@@ -23,7 +23,7 @@ from shared.identification.search.fewer import one_for_many, prune, tell_apart
 from shared.identification.search.judging import judged
 from shared.identification.search.look import look
 from shared.identification.search.outlook import hopeless
-from shared.identification.search.rivals import is_rival, simplest
+from shared.identification.search.rivals import as_well, is_rival, simplest
 from shared.identification.search.screen import Screened, is_steady
 from shared.identification.search.searched import (
     Model,
@@ -137,10 +137,13 @@ def _round(
     for one in tried:
         found.tried.setdefault(one.candidate.label, one)
     useful = [one for one in tried if one.is_event or _is_useful(found, one)]
-    useful = _sure(useful, train, is_measured)
-    if not useful:
+    sure = _sure(useful, train, is_measured)
+    if not sure:
         return False
-    best, rivals = simplest(useful, found.rng)
+    best, rivals = simplest(sure, found.rng)
+    rivals += as_well(
+        best, [one for one in useful if one not in sure and _is_of_links(one)], found.rng
+    )
     rivals = tuple(one for one in rivals if is_rival(found, best, one, train, test))
     begun = replace(best.fit, is_rough=True)  # a mended derivative is no better than that
     fit = polish(begun.space, begun, train, 4, enough=1e-4)
@@ -260,11 +263,15 @@ def _is_useful(found: Search, one: Tried) -> bool:
     if not lasting or not found.problem.noise.is_white:
         return True
     if not one.is_told:
-        return one.candidate.effect.name in _OF_LINKS
+        return _is_of_links(one)
     if gain.apart is None:
         return False
     is_less_left = gain.surely > 0.0 and gain.gain >= _BESIDE * gain.before
     return is_less_left or gain.apart.gain >= _BESIDE * gain.apart.before
+
+
+def _is_of_links(one: Tried) -> bool:
+    return one.candidate.effect.name in _OF_LINKS
 
 
 def _sure(useful: list[Tried], train: tuple[int, ...], is_measured: bool) -> list[Tried]:

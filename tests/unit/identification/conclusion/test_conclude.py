@@ -7,11 +7,13 @@ import msgspec
 import numpy as np
 import pytest
 
+from shared.identification.conclusion import causes
 from shared.identification.conclusion.conclude import conclude
-from shared.identification.gate.held_out import Taken
+from shared.identification.conclusion.sentence import with_base
+from shared.identification.gate.held_out import Taken, floor_of
 from shared.identification.search.bent import worse_than_file
-from shared.identification.search.searched import Far, Otherwise
-from shared.identification.verdict import Unexplained
+from shared.identification.search.searched import Far, Model, Otherwise, Search, Tried
+from shared.identification.verdict import BaseValue, HeldOut, Interval, Unexplained
 from tests.searches import DRAG, ELBOW, LIFT, Searches
 
 _BAD = np.linspace(8.0, 12.0, 8)
@@ -72,6 +74,47 @@ def test_where_nothing_is_named_the_sentence_says_what_the_base_is_far_from(sear
     assert open_.word == "unexplained"
     assert open_.sentence.endswith(said)
     assert said not in conclude(searches.search(_GOOD), ()).sentence
+
+
+def test_where_nothing_is_named_the_sentence_says_what_the_fit_surely_has_otherwise():
+    def number(name: str, value: float, half: float) -> BaseValue:
+        return BaseValue(
+            name=name, unit="kg", nominal=1.0, base_fit=value, extended=value,
+            interval=Interval(low=value - half, high=value + half),
+        )  # fmt: skip
+
+    base = [
+        number("mass elbow", 1.3, 0.1), number("mass lift", 1.5, 0.6), number("mass pan", 0.8, 0.01)
+    ]  # fmt: skip
+    held_out = HeldOut(
+        nominal=3.0, base_fit=1.0, extended=1.0, noise_floor=1.0, share_removed=0.0,
+        share_interval=Interval(low=0.0, high=0.0), joints_mrad={}, tracker_mm={},
+    )  # fmt: skip
+    assert with_base("So.", "none", base, held_out) == (
+        "So. The file's own numbers are at 3.00; the fit has other ones, surest mass pan 0.8 kg "
+        "for 1 and mass elbow 1.3 kg for 1."
+    )
+    assert with_base(
+        "So.", "none", [number(f"m{i}", 2.0, 0.1) for i in range(5)], held_out
+    ).endswith("m2 2 kg for 1 and 2 more.")
+    near = msgspec.structs.replace(held_out, nominal=1.1)
+    assert with_base("So.", "none", base, near) == "So."
+    assert with_base("So.", "named", base, held_out) == "So."
+    assert with_base("So.", "none", base[1:2], held_out) == "So."
+
+
+def test_a_candidate_is_told_why_it_is_not_named(searches: Searches):
+    alike = searches.tried(LIFT, _BAD, _GOOD + 0.01)
+    unsure = searches.tried(DRAG, _BAD, np.r_[np.full(7, 10.0), 3.0])
+    taken = searches.tried(ELBOW, _BAD, _GOOD)
+    found = conclude(searches.search(_BAD, taken, tried=(alike, unsure)), ())
+    why = {(each.effect, each.where): each.why_not for each in found.candidates}
+    assert why["torque_bias", "lift"] == (
+        "does as well as what was taken, but its size may be anything"
+    )
+    assert why["viscous_friction", "elbow"] == (
+        "better on held-out recordings, of which there are too few to be sure"
+    )
 
 
 def test_a_base_that_went_far_is_a_tie_with_what_does_as_well(searches: Searches):
@@ -143,12 +186,19 @@ def test_causes_that_do_as_well_are_a_tie(searches: Searches):
     assert "torque bias of elbow or torque bias of lift" in found.sentence
 
 
-def test_a_sure_cause_is_listed_beside_a_tie(searches: Searches):
+def test_a_sure_cause_is_listed_beside_a_tie(searches: Searches, monkeypatch: pytest.MonkeyPatch):
     sure = searches.tried(DRAG, _BAD, 0.4 * _BAD)
     one, other = (searches.tried(each, 0.4 * _BAD, _GOOD) for each in (ELBOW, LIFT))
+
+    def without(found: Search, each: Tried, train: object, test: object) -> Model:
+        return Model(found.base, 0.7 * _BAD if each is sure else 0.4 * _BAD)
+
+    monkeypatch.setattr(causes, "without", without)
     found = conclude(searches.search(_BAD, one, (other,), before=(sure,)), ())
     assert found.word == "tie"
     assert [(each.effect, each.where) for each in found.causes] == [("viscous_friction", "elbow")]
+    # Without it 7 are left for 1.1, though by itself it took off 6 of 10.
+    assert found.causes[0].share == pytest.approx((7.0 - 1.1) / (10.0 - floor_of(10.0)))
     (tie,) = found.ties
     assert [each.where for each in tie.causes] == ["elbow", "lift"]
     assert "surely gets wrong" in found.sentence

@@ -35,7 +35,7 @@ from shared.identification.gate.held_out import Taken
 from shared.identification.hidden.generator import hide
 from shared.identification.hidden.recipe import Recipe, wish_of
 from shared.identification.progress import silent
-from shared.identification.search.rivals import is_rival, simplest
+from shared.identification.search.rivals import as_well, is_rival, simplest
 from shared.identification.search.rounds import (
     _begun_anew,  # pyright: ignore[reportPrivateUsage]
     _is_in_a_valley,  # pyright: ignore[reportPrivateUsage]
@@ -105,6 +105,20 @@ def test_one_of_more_numbers_is_taken_if_what_was_fitted_to_is_sure_of_it(
     taken, rivals = simplest([more, simple], np.random.default_rng(0))
     assert taken is (more if is_taken else simple)
     assert rivals == ()
+
+
+def test_a_payload_that_may_be_of_any_size_is_a_rival_if_all_recordings_say_no_more(
+    searches: Searches,
+):
+    taken = searches.tried(ELBOW, _BAD, _GOOD, numbers=2)
+    load = _fitted_as_well(searches.tried(_LOAD, _BAD, _GOOD + 0.01), taken)
+    rng = np.random.default_rng(0)
+    assert as_well(taken, [load], rng) == (load,)
+    further = _fitted_as_well(searches.tried(_LOAD, _BAD, _GOOD + 1.0), taken)
+    assert as_well(taken, [further], rng) == ()
+    assert as_well(taken, [_fitted_as_well(load, taken, -20.0)], rng) == ()
+    more = _fitted_as_well(searches.tried(_LOAD, _BAD, _GOOD, numbers=3), taken)
+    assert as_well(taken, [more], rng) == ()
 
 
 @pytest.mark.parametrize(("bend", "is_taken"), [(0.2, True), (0.6, False)])
