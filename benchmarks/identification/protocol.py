@@ -24,7 +24,9 @@ Cell = Literal["single", "null", "null_imperfect", "two", "outside", "tie"]
 CELLS: Final[tuple[str, ...]] = get_args(Cell)
 _ARMS: tuple[ArmName, ...] = ("pr2", "arm3")
 """By turns; effects that neither can have go to ``torque2``."""
-_LATER: Final = ("setpoint_ramp",)
+_LATER: Final = (
+    "setpoint_ramp", "integral_action", "velocity_feedforward", "command_filter",
+)  # fmt: skip
 """Effects that the protocol began without: their trials are numbered after all others."""
 
 

@@ -8,20 +8,16 @@ made the drive.
 
 import functools
 import math
-from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from shared.identification.arm.motion import Motion, smooth_motion
 from shared.identification.arm.places import moving, place_of
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
 from shared.identification.laws.passive import at_joint
-from shared.sim.plant.inverse import inverse_dynamics
+from shared.identification.laws.taken import taken
 from shared.sim.plant.row import Row
-from shared.sim.plant.signals import Signal
 from shared.sim.plant.step import Step
 from shared.sim.plant.structure import Structure
 
@@ -29,21 +25,8 @@ MEMORY = 120.0
 """Time in which most of the warmth is gone (s), of a motor's winding in its housing."""
 _SHORTEST = 2.0
 """Recordings with less in one piece show no history (s)."""
-_FEWEST = 20
-"""Readings that a motion can be told from."""
 _MOST = 10.0
 """Times what it gives, that a drive is asked for at most."""
-_SLOW = 0.02
-"""Speed from which a joint rubs by all of its friction (rad/s)."""
-
-
-@dataclass(frozen=True)
-class _Done:
-    """What an arm did before time 0."""
-
-    motion: Motion
-    taken: Float64
-    """float64[T, J], what that takes of the nominal arm (N m, N)."""
 
 
 class _Law:
@@ -57,9 +40,6 @@ class _Law:
         memory += step.timestep * (np.square(step.drive) - memory / MEMORY)
         heat = memory + before * np.exp(-step.time / MEMORY)
         return step.drive * (1.0 / (1.0 + loss * heat) - 1.0)
-
-
-_known: WeakKeyDictionary[Signal, _Done | None] = WeakKeyDictionary()
 
 
 @functools.cache
@@ -122,43 +102,18 @@ def _heat_before(row: Row, place: str, loss: float) -> float:
 
 def _heat_of_motion(row: Row, joint: int, loss: float) -> float:
     """Return the heat of what a drive was asked for to give what the motion took before time 0."""
-    done = _done(row)
-    if done is None:
+    begin = float(row.logged_q.at[0])
+    if begin >= 0.0 or (done := taken(row)) is None:
         return 0.0
-    motion = done.motion
-    given = done.taken[:, joint] + _beside_nominal(row, joint, motion)
-    edges = np.r_[row.logged_q.at[0], 0.5 * (motion.at[1:] + motion.at[:-1]), 0.0]
+    at = done.motion.at
+    before = at < 0.0
+    edges = np.r_[begin, 0.5 * (at[1:] + at[:-1])[: np.count_nonzero(before) - 1], 0.0]
+    given = done.of(row, joint)[before]
     heat = 0.0
     for torque, span in zip(given.tolist(), np.diff(edges).tolist(), strict=True):
         asked = torque * min(1.0 + loss * heat, _MOST)
         heat = heat * math.exp(-span / MEMORY) + asked**2 * span
     return heat
-
-
-def _done(row: Row) -> _Done | None:
-    """Return what the arm did before time 0, None if that is too short to tell; worked out once."""
-    if row.logged_q not in _known:
-        before = row.logged_q.at < 0.0
-        done = None
-        if before.sum() >= _FEWEST:
-            at, q = row.logged_q.at[before], row.logged_q.values[before]
-            motion = smooth_motion(at, q)
-            taken = inverse_dynamics(row.plant, row.model, motion.q, motion.qd, motion.qdd)
-            done = _Done(motion, taken)
-        _known[row.logged_q] = done
-    return _known[row.logged_q]
-
-
-def _beside_nominal(row: Row, joint: int, motion: Motion) -> Float64:
-    """Return float64[T]: what the motion takes of the arm's own joint, not of the nominal one."""
-    dof = row.dofs[joint]
-    more = [
-        float((row.fields[name] if name in row.fields else getattr(row.model, name))[dof])
-        - float(getattr(row.model, name)[dof])
-        for name in ("dof_armature", "dof_damping", "dof_frictionloss")
-    ]
-    speed = motion.qd[:, joint]
-    return more[0] * motion.qdd[:, joint] + more[1] * speed + more[2] * np.tanh(speed / _SLOW)
 
 
 def _heat(at: Float64, spans: Float64, torque: Float64) -> float:

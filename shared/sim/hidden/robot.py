@@ -80,6 +80,8 @@ class Robot:
         """Change the stream of commands on its way."""
         self.hold: Callable[[], Hold] | None = None
         """Make what the controller takes of a command in a step that begins at an instant (s)."""
+        self.leads: list[Callable[[], Hold]] = []
+        """Make what it adds to that."""
         self.drives: list[Callable[[], Law]] = []
         """Make what changes the drive's torques; called anew for each recording, as ``laws``."""
         self.laws: list[Callable[[], Law]] = []
@@ -201,6 +203,9 @@ class Robot:
         else:
             hold = self.hold()
             ctrl = np.stack([hold(begin, command) for begin in begins.tolist()])
+        for make in self.leads:
+            lead = make()
+            ctrl = ctrl + np.stack([lead(begin, command) for begin in begins.tolist()])
         drives, laws = [make() for make in self.drives], [make() for make in self.laws]
         _begin(model, data, qpos, (rest - self.offset) / self.scale, ctrl[0])
         moment = Moment(
