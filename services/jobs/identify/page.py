@@ -166,6 +166,14 @@ def _cause(cause: Cause) -> Html:
     )
 
 
+_PARTS = (
+    " Told torques and no positions, a simulated arm runs away from where the real one goes, so it "
+    "is set there anew again and again. The angles are how far off it is until the next time; "
+    "x noise counts what is new from block to block, in which an error counts once. So the two "
+    "need not agree, and pictures of angles are darker than the verdict."
+)
+
+
 def _held_out(verdict: Verdict, evidence: Evidence) -> Html:
     held_out = verdict.held_out
     stages = (("nominal", "nominal"), ("base_fit", "base fit"), ("extended", "extended"))
@@ -197,6 +205,8 @@ def _held_out(verdict: Verdict, evidence: Evidence) -> Html:
         caption = "Root-mean-square residual on trajectories that nothing was fitted to."
     if not held_out.is_floor_measured:
         caption += f" {words.floor_text(held_out)}."
+    if evidence.is_in_parts:
+        caption += _PARTS
     each = [
         (
             replay.name,

@@ -118,6 +118,8 @@ class Evidence:
     """All trajectories but repeats, in the order of the data set."""
     diagnostics: Diagnostics
     """See :func:`shared.identification.conclusion.diagnose.diagnose`."""
+    is_in_parts: bool = False
+    """Whether the arm is set anew where it was, again and again, as nothing else brings it back."""
 
     @property
     def held_out(self) -> tuple[Replay, ...]:

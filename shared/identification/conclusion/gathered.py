@@ -57,6 +57,7 @@ def evidence_of(problem: Problem, stages: dict[Stage, Variant]) -> Evidence:
         noise_from_repeats=noise.is_measured,
         replays=replays,
         diagnostics=diagnose(replays, problem.subject.joints, units, Floors(noise, BLOCK)),
+        is_in_parts=problem.subject.control == "torque",
     )
 
 

@@ -64,8 +64,13 @@ class Fit:
 
     @functools.cached_property
     def spread(self) -> Float64:
-        """Return float64[n, n]: covariance of the vector, of white residuals of variance 1."""
-        return np.asarray(np.linalg.pinv(self.jacobian.T @ self.jacobian), np.float64)
+        """Return float64[n, n]: covariance of the vector, of white residuals of variance 1.
+
+        Of a way that changes nothing, but for rounding, it is 0.
+        """
+        square = self.jacobian.T @ self.jacobian
+        rounding = len(square) * float(np.finfo(np.float64).eps)
+        return np.asarray(np.linalg.pinv(square, rounding, hermitian=True), np.float64)
 
     def on(self, rows: NDArray[np.bool_]) -> "Fit":
         """Return it as some rows, bool[M], see it; what is known beforehand counts as it did."""

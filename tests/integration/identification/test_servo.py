@@ -90,6 +90,12 @@ def test_a_servos_friction_is_told_by_its_laws(tmp_path: Path, seconds: float, e
     assert found.keys() == {"load_friction", *["stribeck_friction"] * (excess > 0.0)}
     assert found["load_friction"].value == pytest.approx(LAW["load"], rel=0.05)
     if excess:
-        interval = found["stribeck_friction"].interval
-        assert interval.low < excess < interval.high
+        # A servo's torques are told by the weight that it holds, which may be other than the file's
+        # by some 10 %: all of them are off by as much together.
+        kp = next(each.extended for each in verdict.base if each.name == "kp servo")
+        scale = kp / TORQUE_PER_RAD
+        assert scale == pytest.approx(1.0, abs=0.2)
+        stribeck = found["stribeck_friction"]
+        assert stribeck.interval.low < scale * excess < stribeck.interval.high
+        assert stribeck.value == pytest.approx(scale * excess, rel=0.05)
     assert verdict.held_out.extended < 0.1 * verdict.held_out.base_fit

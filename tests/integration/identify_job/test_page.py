@@ -89,6 +89,13 @@ def test_every_verdict_has_a_page_that_says_it(word: Word) -> None:
     assert ("The cause" in page.text) == bool(found.verdict.causes)
 
 
+def test_of_an_arm_that_is_told_torques_two_measures_are_told_apart() -> None:
+    found = example("named")
+    assert "runs away" not in read(found).text
+    parts = replace(found, evidence=replace(found.evidence, is_in_parts=True))
+    assert "The angles are how far off it is until the next time" in read(parts).text
+
+
 def test_each_cause_is_there_with_its_interval() -> None:
     found, page = example("named"), page_of("named")
     for cause in found.verdict.causes:

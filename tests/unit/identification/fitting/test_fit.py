@@ -98,6 +98,19 @@ def test_cmaes_finds_the_bottom_of_a_bowl_within_bounds():
     assert np.array_equal(found, again)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_no_number_is_surer_than_sure_where_two_do_the_same(seed: int):
+    jacobian = np.random.default_rng(seed).normal(size=(100, 4))
+    jacobian[:, 1] *= 1e7
+    jacobian[:, 2] = (1.0 + 1e-12) * jacobian[:, 1]
+    jacobian[:, 3] *= 1e-9
+    space: Any = None  # not looked at
+    fit = Fit.of(space, np.zeros(4), np.zeros(100), jacobian)
+    variances = np.diag(fit.spread)
+    assert (variances >= 0.0).all()
+    assert variances[0] == pytest.approx(0.01, rel=0.4)
+
+
 def test_nothing_to_search_is_found_at_once():
     empty = np.zeros(0)
     assert minimize(lambda zs: zs.sum(axis=1), empty, empty, empty, sigma=0.3, seed=1).size == 0
