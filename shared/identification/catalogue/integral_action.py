@@ -74,18 +74,24 @@ class IntegralAction:
         return ()
 
     def enter(self, row: Row, place: str, values: Float64) -> None:
-        """Let the servos integrate."""
-        rate = float(values[0])
-        if not rate:
+        """Let the servos integrate, beside what they do so already."""
+        labels = row.plant.labels
+        law = _law(len(labels))
+        told = np.zeros((3, len(labels)))
+        for each, before in row.laws:
+            if each is law:
+                told[0] = before[: len(labels)]
+        own = [place] if place else [each for each in labels if row.drives_of(each)]
+        told[0, [labels.index(label) for label in own]] += float(values[0])
+        row.laws = [one for one in row.laws if one[0] is not law]
+        if not told.any():
             return
-        own = [place] if place else [each for each in row.plant.labels if row.drives_of(each)]
         done = taken(row)
-        all_values = np.zeros((3, len(row.plant.labels)))
-        for label in own:
-            joint, servo = row.plant.labels.index(label), servo_of(row, label)
-            wound = 0.0 if done is None else _wound_up(row, joint, servo, done, rate)
-            all_values[:, joint] = rate, servo.damping, wound
-        row.torque(_law(len(row.plant.labels)), all_values.ravel())
+        for joint in np.flatnonzero(told[0]).tolist():
+            servo = servo_of(row, labels[joint])
+            wound = 0.0 if done is None else _wound_up(row, joint, servo, done, told[0, joint])
+            told[1:, joint] = servo.damping, wound
+        row.torque(law, told.ravel())
 
 
 def _wound_up(row: Row, joint: int, servo: Servo, done: Taken, rate: float) -> float:

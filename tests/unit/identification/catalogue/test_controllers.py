@@ -84,6 +84,30 @@ def test_an_integral_counts_its_error_behind_a_gear(tmp_path: Path) -> None:
     )
 
 
+def test_an_integral_of_one_joint_adds_to_that_of_all(tmp_path: Path) -> None:
+    subject = make_subject(make_plant(tmp_path))
+    sagging = recorded([0.0, 0.0, 0.0], 2.0, [0.0, 0.02, 0.0])
+
+    def apart(row: Row) -> None:
+        INTEGRAL.enter(row, "", np.array([2.0]))
+        INTEGRAL.enter(row, "lift", np.array([3.0]))
+
+    def together(row: Row) -> None:
+        for place, rate in (("pan", 2.0), ("lift", 5.0), ("elbow", 2.0)):
+            INTEGRAL.enter(row, place, np.array([rate]))
+
+    def taken_back(row: Row) -> None:
+        INTEGRAL.enter(row, "", np.array([2.0]))
+        INTEGRAL.enter(row, "", np.array([-2.0]))
+
+    one, other, none = Rollouts(subject.plant, (), 3).run(
+        [(apart, sagging), (together, sagging), (taken_back, sagging)]
+    )
+    np.testing.assert_allclose(one.q, other.q, atol=1e-12)
+    np.testing.assert_array_equal(none.q, replay(subject, sagging).q)
+    assert np.abs(one.q - none.q).max() > 1e-3
+
+
 def test_fed_forward_a_servo_follows_a_ramp_without_lag(tmp_path: Path) -> None:
     subject = _cart(tmp_path, 'damping="9"')
     ramp = recorded(_ramp, 4.0, [0.0])
