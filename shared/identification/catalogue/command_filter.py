@@ -8,7 +8,7 @@ from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
 from shared.identification.laws.servo import servo_joints
 from shared.sim.plant.row import Row
-from shared.sim.plant.signals import Signal
+from shared.sim.plant.signals import Signal, instants
 from shared.sim.plant.structure import Structure
 
 _EARLIER = 1.0
@@ -55,9 +55,7 @@ def smoothed(signal: Signal, time: float, period: float, until: float) -> Signal
         period: of the result, each value of which is the mean over one (s).
         until: when it may end (s).
     """
-    first = max(-_EARLIER, float(signal.at[0]))
-    count = max(int((until - first) / period) + 2, 2)
-    at: Float64 = first + period * np.arange(count, dtype=np.float64)
+    at = instants(signal, period, -_EARLIER, until)
     told = signal.mean(at, period)
     kept = np.exp(-period / time)
     ends: Float64 = lfilter([1.0 - kept], [1.0, -kept], told, axis=0, zi=kept * told[:1])[0]

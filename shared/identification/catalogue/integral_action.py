@@ -13,7 +13,13 @@ import numpy as np
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.laws.servo import Servo, servo_joints, servo_of, together_or_apart
+from shared.identification.laws.servo import (
+    Servo,
+    labels_at,
+    servo_joints,
+    servo_of,
+    together_or_apart,
+)
 from shared.identification.laws.taken import Taken, taken
 from shared.sim.plant.row import Row
 from shared.sim.plant.step import Step
@@ -81,8 +87,8 @@ class IntegralAction:
         for each, before in row.laws:
             if each is law:
                 told[0] = before[: len(labels)]
-        own = [place] if place else [each for each in labels if row.drives_of(each)]
-        told[0, [labels.index(label) for label in own]] += float(values[0])
+        own = [labels.index(label) for label in labels_at(row, place)]
+        told[0, own] += float(values[0])
         row.laws = [one for one in row.laws if one[0] is not law]
         if not told.any():
             return

@@ -9,7 +9,12 @@ import numpy as np
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.laws.servo import servo_joints, servo_of, together_or_apart
+from shared.identification.laws.servo import (
+    labels_at,
+    servo_joints,
+    servo_of,
+    together_or_apart,
+)
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal
 from shared.sim.plant.structure import Structure
@@ -49,9 +54,8 @@ class VelocityFeedforward:
         share, command = float(values[0]), row.command
         if not share or len(command.at) < _FEWEST:
             return
-        own = [place] if place else [each for each in row.plant.labels if row.drives_of(each)]
         lead = np.zeros(command.values.shape[1])
-        for label in own:
+        for label in labels_at(row, place):
             servo = servo_of(row, label)
             damping = servo.damping + float(row.current("dof_damping")[row.dof(label)])
             lead += np.where(servo.gain, share * damping / servo.gain.sum(), 0.0)

@@ -38,6 +38,11 @@ def together_or_apart(labels: tuple[str, ...]) -> tuple[str, ...]:
     return ("", *labels) if len(labels) > 1 else labels
 
 
+def labels_at(row: Row, place: str) -> tuple[str, ...]:
+    """Return the logged joints that such a place is of: one, or all that have a servo."""
+    return (place,) if place else tuple(each for each in row.plant.labels if row.drives_of(each))
+
+
 def servo_of(row: Row, label: str) -> Servo:
     """Return the servo of an arm's own joint, as its gains are by now."""
     gains, biases = row.current("actuator_gainprm"), row.current("actuator_biasprm")

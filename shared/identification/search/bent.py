@@ -86,7 +86,7 @@ def otherwise(found: Search, progress: Progress) -> Otherwise | None:
         if is_sure and _brings_back(base, fit) and not is_worse(losses, found.base_losses):
             gain = compare(found.base_losses, losses, np.random.default_rng(0))
             one = Tried(each, fit, gain, losses)
-            if not (one.is_of_the_simulation or one.is_of_another_law):
+            if one.may_be_named:
                 tried.append(one)
     if not tried:
         return None

@@ -255,7 +255,7 @@ def _is_useful(found: Search, one: Tried) -> bool:
     what is held out cannot tell that, see ``foretold.py``.
     """
     gain = one.gain
-    if one.is_of_the_simulation or one.is_of_another_law:
+    if not one.may_be_named:
         return False
     if not gain.is_useful(float(found.base_losses.mean())):
         return False

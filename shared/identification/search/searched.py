@@ -97,6 +97,11 @@ class Tried:
         return any(is_at_end(value, each) for value, each in self._numbers)
 
     @property
+    def may_be_named(self) -> bool:
+        """Return whether its sizes are of this law, and of an arm."""
+        return not (self.is_of_the_simulation or self.is_of_another_law)
+
+    @property
     def _numbers(self) -> list[tuple[float, Quantity]]:
         """Return its sizes as they were fitted, each with what it is."""
         subject, place = self.fit.space.problem.subject, self.candidate.place

@@ -105,6 +105,17 @@ def whole_arm(scene: Scene) -> tuple[str, ...]:
     return ("",)
 
 
+def servos_alike(scene: Scene) -> tuple[str, ...]:
+    """Return the place of what all servos have alike; none where there are no servos."""
+    return whole_arm(scene) if scene.arm.control == "position" else ()
+
+
+def servos(scene: Scene) -> tuple[str, ...]:
+    """Return the places of what all servos have alike, or one of them."""
+    alike = servos_alike(scene)
+    return (*alike, *scene.joints) if alike else ()
+
+
 def every_joint(scene: Scene) -> tuple[str, ...]:
     """Return the logged joints."""
     return scene.joints

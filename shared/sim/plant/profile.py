@@ -3,7 +3,7 @@
 import numpy as np
 
 from shared.sim.arm import Float64
-from shared.sim.plant.signals import Signal, held_spans
+from shared.sim.plant.signals import Signal, held_spans, instants
 
 
 def ramped(
@@ -21,9 +21,7 @@ def ramped(
         begin: where the set point rests at its command, or at the first one if that is later (s).
         until: when the result may end (s).
     """
-    first = max(begin, float(signal.at[0]))
-    count = max(int((until - first) / period) + 2, 2)
-    at: Float64 = first + period * np.arange(count, dtype=np.float64)
+    at = instants(signal, period, begin, until)
     targets = signal.held(at)
     out = np.empty_like(targets)
     place, speed = targets[0], np.zeros(targets.shape[1])

@@ -46,6 +46,13 @@ class Signal:
         return Signal(self.at + seconds, self.values)
 
 
+def instants(signal: Signal, period: float, begin: float, until: float) -> Float64:
+    """Return float64[T], even ones from a begin, or a signal's own if later, past an end (s)."""
+    first = max(begin, float(signal.at[0]))
+    count = max(int((until - first) / period) + 2, 2)
+    return first + period * np.arange(count, dtype=np.float64)
+
+
 def filtered(signal: Signal, share: float, until: float) -> Signal:
     """Return what the PR2 controller's command filter makes of poses, once per 1 ms cycle.
 

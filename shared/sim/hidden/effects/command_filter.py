@@ -3,7 +3,7 @@
 import numpy as np
 
 from shared.sim.arm import Float64
-from shared.sim.hidden.effect import Case, Hidden, Scene, whole_arm
+from shared.sim.hidden.effect import Case, Hidden, servos_alike
 from shared.sim.hidden.robot import Hold, Robot
 from shared.sim.plant.signals import Signal
 
@@ -37,14 +37,10 @@ def _filter(constant: float, timestep: float) -> Hold:
     return hold
 
 
-def _places(scene: Scene) -> tuple[str, ...]:
-    return whole_arm(scene) if scene.arm.control == "position" else ()
-
-
 HIDDEN = Hidden(
     name="command_filter",
     way="a filter of the set point by the midpoint rule, from step to step",
-    places=_places,
+    places=servos_alike,
     sizes=lambda scene, place: (0.008, 0.2),
     values=lambda case: {"time": (case.size, "s")},
     enter=_enter,

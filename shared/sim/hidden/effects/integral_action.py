@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from shared.sim.hidden.effect import Case, Hidden, Scene
+from shared.sim.hidden.effect import Case, Hidden, servos
 from shared.sim.hidden.robot import Law, Moment, Robot
 
 
@@ -28,14 +28,10 @@ def _integrating(case: Case) -> Law:
     return act
 
 
-def _places(scene: Scene) -> tuple[str, ...]:
-    return ("", *scene.joints) if scene.arm.control == "position" else ()
-
-
 HIDDEN = Hidden(
     name="integral_action",
     way="a sum of errors in the servo, from when it was switched on",
-    places=_places,
+    places=servos,
     sizes=lambda scene, place: (0.5, 8.0),
     values=lambda case: {"rate": (case.size, "1/s")},
     enter=_enter,

@@ -3,7 +3,7 @@
 import numpy as np
 
 from shared.sim.arm import Float64
-from shared.sim.hidden.effect import Case, Hidden, Scene, whole_arm
+from shared.sim.hidden.effect import Case, Hidden, servos_alike
 from shared.sim.hidden.robot import Hold, Robot
 from shared.sim.plant.signals import Signal
 
@@ -39,14 +39,10 @@ def _filter(acceleration: float, timestep: float) -> Hold:
     return hold
 
 
-def _places(scene: Scene) -> tuple[str, ...]:
-    return whole_arm(scene) if scene.arm.control == "position" else ()
-
-
 HIDDEN = Hidden(
     name="setpoint_ramp",
     way="a filter of the set point, from step to step",
-    places=_places,
+    places=servos_alike,
     sizes=lambda scene, place: (0.002, 0.15),
     values=lambda case: {"inverse_acceleration": (case.size, "1/(rad/s^2)")},
     enter=_enter,

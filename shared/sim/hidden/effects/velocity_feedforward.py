@@ -3,7 +3,7 @@
 import numpy as np
 
 from shared.sim.arm import Float64
-from shared.sim.hidden.effect import Case, Hidden, Scene
+from shared.sim.hidden.effect import Case, Hidden, servos
 from shared.sim.hidden.robot import Hold, Robot
 from shared.sim.plant.signals import Signal
 
@@ -31,14 +31,10 @@ def _lead(robot: Robot, case: Case) -> Hold:
     return lead
 
 
-def _places(scene: Scene) -> tuple[str, ...]:
-    return ("", *scene.joints) if scene.arm.control == "position" else ()
-
-
 HIDDEN = Hidden(
     name="velocity_feedforward",
     way="beside the command, from step to step",
-    places=_places,
+    places=servos,
     sizes=lambda scene, place: (0.08, 1.2),
     values=lambda case: {"share": (case.size, "1")},
     enter=_enter,
