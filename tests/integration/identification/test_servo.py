@@ -4,14 +4,15 @@ Its motor law and friction are BAM's (Duclusaud et al., ICRA 2025), its equation
 what the finder says of it does not come from a simulator that it shares with the data.
 """
 
+import functools
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from shared.identification.dataset.types import Dataset, Float64, ModelSource, Trajectory
 from shared.identification.find import identify
+from shared.identification.verdict import Verdict
 
 MASS, LENGTH, ROTOR = 1.0, 0.15, 0.02
 """Of the weight (kg), its distance (m), and the motor's inertia behind the gear (kg m^2)."""
@@ -74,17 +75,34 @@ def recording(
     )  # fmt: skip
 
 
+Told = Callable[[float, float], Verdict]
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> Told:
+    """Return what says what is told of a servo by recordings of a length and an excess, once."""
+
+    @functools.cache
+    def verdict(seconds: float, excess: float) -> Verdict:
+        path = tmp_path_factory.mktemp("servo") / "servo.xml"
+        path.write_text(MODEL)
+        rng = np.random.default_rng(1)
+        source, names = ModelSource("mjcf", path), ("servo",)
+        made = tuple(
+            recording(name, motion, seconds, excess, rng) for name, motion in MOTIONS.items()
+        )
+        return identify(
+            Dataset(path.parent, source, "position", names, names, made, (), "")
+        ).verdict
+
+    return verdict
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize(("seconds", "excess"), [(4.0, 0.0), (5.0, LAW["excess"])])
-def test_a_servos_friction_is_told_by_its_laws(tmp_path: Path, seconds: float, excess: float):
-    path = tmp_path / "servo.xml"
-    path.write_text(MODEL)
-    rng = np.random.default_rng(1)
-    source, names = ModelSource("mjcf", path), ("servo",)
-    made = tuple(recording(name, motion, seconds, excess, rng) for name, motion in MOTIONS.items())
-    dataset = Dataset(tmp_path, source, "position", names, names, made, (), "")
-    verdict = identify(dataset).verdict
+def test_a_servos_friction_is_told_by_its_laws(told: Told, seconds: float, excess: float):
+    verdict = told(seconds, excess)
     assert verdict.verdict == "named"
     found = {cause.effect: cause for cause in verdict.causes}
     assert found.keys() == {"load_friction", *["stribeck_friction"] * (excess > 0.0)}
@@ -99,3 +117,15 @@ def test_a_servos_friction_is_told_by_its_laws(tmp_path: Path, seconds: float, e
         assert stribeck.interval.low < scale * excess < stribeck.interval.high
         assert stribeck.value == pytest.approx(scale * excess, rel=0.05)
     assert verdict.held_out.extended < 0.1 * verdict.held_out.base_fit
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+@pytest.mark.xfail(
+    strict=True,
+    reason="0.072 to 0.093 N m: the interval does not know that all torques may be larger together",
+)
+def test_the_interval_of_a_servos_excess_covers_it(told: Told):
+    causes = told(5.0, LAW["excess"]).causes
+    interval = next(each.interval for each in causes if each.effect == "stribeck_friction")
+    assert interval.low < LAW["excess"] < interval.high
