@@ -131,6 +131,24 @@ def _is_alike(
     return margin.gain < max(margin.error, ALIKE * best.gain.gain)
 
 
+def loads_alike(sure: list[Tried]) -> list[Tried]:
+    """Return loads of which what was fitted to hardly prefers one, as roughly as they are fitted.
+
+    A constant torque is soon at its best, two screws of a counterbalance that do nearly the same
+    are not: which of them the recordings prefer only says what both are at their best.
+
+    Args:
+        sure: causes that pass.
+
+    Returns:
+        Nothing if there is one of them only.
+    """
+    loads = [one for one in sure if one.candidate.effect.name in _LOADS]
+    least = min((one.fit.cost for one in loads), default=0.0)
+    near = [one for one in loads if one.fit.cost <= (1 + _NEARLY) * least]
+    return near if len(near) > 1 else []
+
+
 def as_well(taken: Tried, others: list[Tried], rng: np.random.Generator) -> tuple[Tried, ...]:
     """Return those of other causes that all recordings do not tell from what is taken.
 

@@ -23,7 +23,7 @@ from shared.identification.search.fewer import one_for_many, prune, tell_apart
 from shared.identification.search.judging import judged
 from shared.identification.search.look import look
 from shared.identification.search.outlook import hopeless
-from shared.identification.search.rivals import as_well, is_rival, simplest
+from shared.identification.search.rivals import as_well, is_rival, loads_alike, simplest
 from shared.identification.search.screen import Screened, is_steady
 from shared.identification.search.searched import (
     Model,
@@ -140,16 +140,13 @@ def _round(
     sure = _sure(useful, train, is_measured)
     if not sure:
         return False
+    unsure = [one for one in useful if one not in sure and _is_of_links(one)]
+    alike = loads_alike(sure)
+    sure = [_at_best(found, one, train) if one in alike else one for one in sure]
     best, rivals = simplest(sure, found.rng)
-    rivals += as_well(
-        best, [one for one in useful if one not in sure and _is_of_links(one)], found.rng
-    )
+    rivals += as_well(best, unsure, found.rng)
     rivals = tuple(one for one in rivals if is_rival(found, best, one, train, test))
-    begun = replace(best.fit, is_rough=True)  # a mended derivative is no better than that
-    fit = polish(begun.space, begun, train, 4, enough=1e-4)
-    final = _tried(found, best.screened, fit, best.is_event)
-    if final.gain.loss <= best.gain.loss and (best.is_event or _is_useful(found, final)):
-        best = final
+    best = _at_best(found, best, train)
     best, rivals, family = _elsewhere(found, best, rivals, train, test, progress)
     found.accepted.append(best)
     found.rivals.append(rivals)
@@ -204,6 +201,15 @@ def _begun_anew(found: Search, one: Tried, train: tuple[int, ...]) -> Tried:
     if fit is one.fit:
         return one
     return _tried(found, one.screened, fit, one.is_event)
+
+
+def _at_best(found: Search, one: Tried, train: tuple[int, ...]) -> Tried:
+    """Return a cause that passes, fitted to the last, if it does no worse then."""
+    begun = replace(one.fit, is_rough=True)  # a mended derivative is no better than that
+    fit = polish(begun.space, begun, train, 4, enough=1e-4)
+    final = _tried(found, one.screened, fit, one.is_event)
+    is_better = final.gain.loss <= one.gain.loss and (one.is_event or _is_useful(found, final))
+    return final if is_better else one
 
 
 def _tried(found: Search, screened: Screened, fit: Fit, is_event: bool) -> Tried:

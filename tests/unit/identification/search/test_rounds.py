@@ -35,7 +35,7 @@ from shared.identification.gate.held_out import Taken
 from shared.identification.hidden.generator import hide
 from shared.identification.hidden.recipe import Recipe, wish_of
 from shared.identification.progress import silent
-from shared.identification.search.rivals import as_well, is_rival, simplest
+from shared.identification.search.rivals import as_well, is_rival, loads_alike, simplest
 from shared.identification.search.rounds import (
     _begun_anew,  # pyright: ignore[reportPrivateUsage]
     _is_in_a_valley,  # pyright: ignore[reportPrivateUsage]
@@ -48,7 +48,7 @@ from shared.identification.search.searched import Tried
 from shared.identification.verdict import Verdict
 from tests.searches import DRAG, ELBOW, LIFT, Searches
 
-_LOAD = Candidate(PAYLOAD, "")
+_LOAD, _TILT = Candidate(PAYLOAD, ""), Candidate(TILT, "")
 _BAD = np.linspace(8.0, 12.0, 8)
 _GOOD = np.linspace(1.0, 1.2, 8)
 
@@ -119,6 +119,16 @@ def test_a_payload_that_may_be_of_any_size_is_a_rival_if_all_recordings_say_no_m
     assert as_well(taken, [_fitted_as_well(load, taken, -20.0)], rng) == ()
     more = _fitted_as_well(searches.tried(_LOAD, _BAD, _GOOD, numbers=3), taken)
     assert as_well(taken, [more], rng) == ()
+
+
+def test_loads_that_are_nearly_alike_are_fitted_to_the_last(searches: Searches):
+    constant, balance = (searches.tried(each, _BAD, _GOOD) for each in (LIFT, _TILT))
+    friction = searches.tried(DRAG, _BAD, _GOOD)
+    near = _fitted_as_well(balance, constant, -0.04 * constant.fit.cost)
+    assert loads_alike([constant, friction, near]) == [constant, near]
+    far = _fitted_as_well(balance, constant, -0.06 * constant.fit.cost)
+    assert loads_alike([constant, friction, far]) == []
+    assert loads_alike([friction]) == []
 
 
 @pytest.mark.parametrize(("bend", "is_taken"), [(0.2, True), (0.6, False)])
