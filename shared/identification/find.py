@@ -35,6 +35,7 @@ from shared.identification.search.misstated import misstated
 from shared.identification.search.once import is_named, take_back_pushes, take_pushes
 from shared.identification.search.rounds import search
 from shared.identification.search.searched import Search, is_open
+from shared.identification.search.sized import take_back_sizeless
 from shared.identification.search.trimmed import led_astray
 from shared.identification.verdict import Unexplained, Verdict
 from shared.runtime.build import commit
@@ -219,6 +220,7 @@ def _searched(
     if other := misstated(found, untouched, run.effects, seed, progress):
         found, left = other, _left(other, _pushes(left))
     fit_to_all(found, left)
+    take_back_sizeless(found, left)
     clock.over("search")
     return found, left
 

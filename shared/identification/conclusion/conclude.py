@@ -9,7 +9,6 @@ from shared.identification.conclusion.limits import limits_of
 from shared.identification.conclusion.sentence import sentence_of, with_base, with_far
 from shared.identification.dataset.types import Float64
 from shared.identification.fitting.problem import Variant
-from shared.identification.gate.certainty import half_widths, is_there
 from shared.identification.gate.held_out import LEAST_SHARE, compare, floor_of
 from shared.identification.search.bent import ties_with_base
 from shared.identification.search.far import far_from_file
@@ -21,6 +20,7 @@ from shared.identification.search.searched import (
     plain_losses,
     why_open,
 )
+from shared.identification.search.sized import widths_of
 from shared.identification.verdict import (
     BaseValue,
     Cause,
@@ -62,7 +62,7 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
         left: what the extended model does not explain.
     """
     held_out = _held_out(found)
-    widths = _widths(found)
+    widths = widths_of(found)
     accepted = causes_of(found, widths)
     ties = ties_of(found, accepted) or ties_with_base(found)
     word = _word(found, ties, left)
@@ -83,25 +83,6 @@ def conclude(found: Search, left: tuple[Unexplained, ...]) -> Conclusion:
         base=base,
         far=far,
     )
-
-
-def _widths(found: Search) -> Float64:
-    """Return float64[n], half widths of the coordinates' intervals.
-
-    What is no noise does not shrink with more recordings, so the wider one of two fits is told;
-    but of a cause that only all recordings together show, what they say.
-    """
-    train = found.problem.of("train")
-    first = half_widths(found.current, train)
-    if found.final is None:
-        return first
-    last = half_widths(found.final, found.fitted_to)
-    widths = np.maximum(first, last)
-    for each in found.accepted:
-        if not is_there(found.current, each.candidate, train):
-            where = found.current.space.where(each.candidate)
-            widths[where] = last[where]
-    return widths
 
 
 def extended(found: Search) -> Variant:

@@ -69,7 +69,8 @@ def sentence_of(
         return (
             f"The base model does not fit: {ratio} are left with {listing(doubted)} as the model "
             "file has it, and a fit that may change it goes further than is believable (30 %, "
-            "15 mm). Correct the links in the model file before looking for causes."
+            "15 mm). Check what the model file says of the links; where it is right, something "
+            "acts that no effect of the catalogue explains by itself."
         )
     if causes:
         names = " and ".join(f"{label(cause)} ({_size(cause)})" for cause in causes)

@@ -15,7 +15,7 @@ from shared.identification.search.bent import is_worse
 from shared.identification.search.cleared import clear
 from shared.identification.search.far import FEW, shown_far
 from shared.identification.search.rounds import search
-from shared.identification.search.searched import Search, is_open
+from shared.identification.search.searched import Model, Search, is_open
 from shared.telemetry.wording import listing
 
 _EFFECTS = {
@@ -53,6 +53,7 @@ def misstated(
         gone = [names.index(name) for name in (*wrong, *bent)]
         other = begin_without(untouched, gone, seed=seed)
     other.doubted = (*untouched.doubted, *bent)
+    other.freer = Model(untouched.base, untouched.base_losses)
     other.candidates = (*other.candidates, *wrong.values())
     known = {each.effect.name for each in wrong.values()}
     other.ruled_out = {name: why for name, why in other.ruled_out.items() if name not in known}

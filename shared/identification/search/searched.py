@@ -162,6 +162,8 @@ class Left(NamedTuple):
 
     nominal: float
     base: float
+    freer: float
+    """A base that may bend more, see ``Search.freer``; as much as ``base`` if there is none."""
     current: float
     by_all: float | None
 
@@ -213,6 +215,9 @@ class Search:
     by_all: ByAll | None = None
     """What the current model leaves once it is fitted to all recordings; None where it was not
     asked."""
+    freer: "Model | None" = None
+    """A base that may be wrong where this search's is as the model file has it, if there is one:
+    more than that leaves is nothing to be explained."""
     only_like: str = ""
     """Why what was accepted only stands in for a law that is not known, see ``likeness.py``;
     nothing if it does not."""
@@ -229,16 +234,23 @@ class Search:
     @property
     def left(self) -> Left:
         """Return how much is left of what is new in each block: there small causes show."""
-        return Left(
-            float(self.nominal_losses.mean()), float(self.base_losses.mean()),
-            float(self.current_losses.mean()), None if self.by_all is None else self.by_all.new,
-        )  # fmt: skip
+        nominal, base, current = (
+            float(each.mean())
+            for each in (self.nominal_losses, self.base_losses, self.current_losses)
+        )
+        freer = base if self.freer is None else float(self.freer.losses.mean())
+        return Left(nominal, base, freer, current, None if self.by_all is None else self.by_all.new)
 
     @property
     def plainly(self) -> Left:
         """Return how much is left as it is: what is slow and wrong shows in that."""
         nominal, base, current = (float(each.mean()) for each in plain_losses(self))
-        return Left(nominal, base, current, None if self.by_all is None else self.by_all.plain)
+        freer = base
+        if self.freer is not None:
+            own = self.freer.fit.space.problem
+            freer = float(plain_losses_of(own, self.freer).mean())
+        by_all = None if self.by_all is None else self.by_all.plain
+        return Left(nominal, base, freer, current, by_all)
 
     @property
     def told(self) -> Fit:
@@ -304,7 +316,7 @@ def _most(found: Search, left: Left) -> float:
     if not found.accepted:
         return NEARLY_NOISE
     is_exact = all(one.candidate.effect.side in EXACT for one in found.accepted)
-    share = 0.0 if is_exact else MAY_BE_LEFT * left.base
+    share = 0.0 if is_exact else MAY_BE_LEFT * min(left.base, left.freer)
     if found.doubted:
         share = min(share, max(BESIDE_A_DOUBT, HARDLY_ANY * left.base))
     return max(BESIDE_A_NAME, share)

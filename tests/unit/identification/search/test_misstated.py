@@ -23,7 +23,7 @@ def _search(is_open: bool, named: tuple[Candidate, ...], left: float) -> Any:
     return SimpleNamespace(
         problem=problem, base=None, candidates=(), doubted=(), ruled_out={}, is_open=is_open,
         accepted=[SimpleNamespace(candidate=each) for each in named],
-        current_losses=np.full(8, left),
+        base_losses=np.full(8, 2.0 * left), current_losses=np.full(8, left),
     )  # fmt: skip
 
 
@@ -57,3 +57,4 @@ def test_the_file_is_believed_if_a_cause_explains_all_beside_it(
     untouched = _search(True, (), 1.5)
     taken = module.misstated(found, untouched, effects(), 0, silent)
     assert (taken is other) == is_taken
+    assert other.freer.losses is untouched.base_losses

@@ -138,3 +138,15 @@ def test_where_the_base_is_doubted_less_may_be_left(
     found.accepted.append(searches.tried(ELBOW, first, after))
     found.current_losses = after
     assert is_open(found) is is_too_much
+
+
+@pytest.mark.parametrize(("of_freer", "is_much"), [(90.0, False), (20.0, True), (None, False)])
+def test_what_may_be_left_goes_by_a_base_that_may_bend_more(
+    tmp_path: Path, of_freer: float | None, is_much: bool
+):
+    searches = Searches(tmp_path)
+    base = np.full(4, 100.0)
+    found = searches.search(base, searches.tried(ELBOW, base, np.full(4, 5.0)))
+    if of_freer is not None:
+        found.freer = Model(searches.base, np.full(4, of_freer))
+    assert is_open(found) is is_much
