@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shared.identification.dataset.beginnings import LEAST, first_velocities
 from shared.identification.dataset.checks import is_resolved, velocity_ratio
@@ -21,6 +22,10 @@ LEAST_SPEED: Final = 0.05
 """A joint that is slower (rad/s, m/s) shows little."""
 HIGHEST_SPEED: Final = 30.0
 """Of an arm's joint (rad/s, m/s)."""
+AROUND: Final = 10
+"""Rows, over which a joint that is on its way goes on by a step of its encoder a row."""
+FEW_SPIKES: Final = 0.01
+"""Share of the rows that are spikes at most: else all of them are noisy, or in degrees."""
 COARSE: Final = 1e-3
 """Steps of an encoder (rad, m)."""
 SLOWEST_HZ: Final = 40.0
@@ -133,16 +138,15 @@ def of_start(trajectory: Trajectory, has_initial: bool, has_velocity: bool) -> l
 
 
 def of_joints(trajectory: Trajectory, joints: Sequence[str]) -> list[Caveat]:
-    """Return ``fast``, ``quantised``, ``held_readings`` and ``velocity_disagrees``."""
+    """Return ``fast``, ``spikes``, ``quantised``, ``held_readings``, ``velocity_disagrees``."""
     name, found = trajectory.name, list[Caveat]()
     q, times = trajectory.q, trajectory.joints_at
     steps = np.diff(q, axis=0)
-    still = np.all(steps == 0.0, axis=1)
-    moving = np.abs(q - q[0]).max() > LEAST_RANGE
-    if moving and len(still) > 20 and 0.3 < float(still.mean()) < 0.98:
+    still = np.all(steps == 0.0, axis=1)[_on_the_way(q)]
+    if len(still) > 20 and 0.3 < float(still.mean()) < 0.98:
         found.append(Caveat("held_readings", name, (
-            f"{still.mean():.0%} of the rows repeat the reading before: the log is faster than "
-            "the joints are read; write each reading once"
+            f"{still.mean():.0%} of the rows on the way repeat the reading before: the log is "
+            "faster than the joints are read; write each reading once"
         )))  # fmt: skip
     for index, joint in enumerate(joints):
         speed = float(np.quantile(np.abs(steps[:, index] / np.diff(times)), 0.99))
@@ -150,6 +154,12 @@ def of_joints(trajectory: Trajectory, joints: Sequence[str]) -> list[Caveat]:
             found.append(Caveat("fast", name, (
                 f"joint {joint!r} goes at {speed:.3g} rad/s (m/s) by its positions: are they in "
                 "degrees or mm, or noisy?"
+            )))  # fmt: skip
+        if rows := _spikes(steps[:, index] / np.diff(times)):
+            at = ", ".join(f"{times[row]:.3f}" for row in rows[:3])
+            found.append(Caveat("spikes", name, (
+                f"joint {joint!r} jumps away for one reading and back, at {at} s"
+                f"{' and more often' if len(rows) > 3 else ''}: leave such rows out"
             )))  # fmt: skip
         if (step := step_of(q[:, index])) > COARSE:
             values = len(np.unique(q[:, index]))
@@ -166,6 +176,26 @@ def of_joints(trajectory: Trajectory, joints: Sequence[str]) -> list[Caveat]:
                     "(correlation under 0.9): is it of another joint, delayed, or filtered?"
                 )))  # fmt: skip
     return found
+
+
+def _on_the_way(q: Float64) -> NDArray[np.bool_]:
+    """Return bool[T - 1], which readings come while a joint goes on by many of its least steps.
+
+    A joint that rests, or creeps from one step of its encoder to the next, is read anew each time.
+    """
+    out = np.zeros(max(len(q) - 1, 0), np.bool_)
+    for column in q.T:
+        gone = np.abs(column[AROUND:] - column[:-AROUND])
+        out[np.flatnonzero(gone > AROUND * step_of(column)) + AROUND // 2] = True
+    return out
+
+
+def _spikes(speeds: Float64) -> list[int]:
+    """Return rows whose reading is one no joint was at: it goes there and back too fast."""
+    is_fast = np.abs(speeds) > HIGHEST_SPEED
+    is_back = is_fast[:-1] & is_fast[1:] & (speeds[:-1] * speeds[1:] < 0.0)
+    rows: list[int] = (np.flatnonzero(is_back) + 1).tolist()
+    return rows if len(rows) <= FEW_SPIKES * len(speeds) else []
 
 
 def of_tracker(trajectory: Trajectory) -> list[Caveat]:

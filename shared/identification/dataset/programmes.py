@@ -23,7 +23,7 @@ def repeats_of(
     kept: list[Trajectory] = []
     found: list[Caveat] = []
     for each in trajectories:
-        apart = difference(by_name[each.repeats], each) if each.repeats else 0.0
+        apart = _apart(by_name[each.repeats], each) if each.repeats else 0.0
         is_other = apart > ALIKE
         if is_other:
             found.append(Caveat("repeat_differs", each.name, (
@@ -59,13 +59,18 @@ def of_programmes(trajectories: Sequence[Trajectory]) -> list[Caveat]:
 def difference(one: Trajectory, other: Trajectory) -> float:
     """Return how far two commands differ, as a share of their own movement.
 
-    Both are read at the same 500 times since their first command, over the shorter of the two;
     1 or more where their lengths differ by more than a tenth.
     """
     spans = [each.command_at[-1] - each.command_at[0] for each in (one, other)]
-    if max(spans) > 1.1 * min(spans) + 0.1:
-        return 1.0
-    shorter = float(min(spans))
+    return 1.0 if max(spans) > 1.1 * min(spans) + 0.1 else _apart(one, other)
+
+
+def _apart(one: Trajectory, other: Trajectory) -> float:
+    """Return the same over the shorter of the two, however long the other is.
+
+    Both are read at the same 500 times since their first command.
+    """
+    shorter = float(min(each.command_at[-1] - each.command_at[0] for each in (one, other)))
     grid = 1e-9 + shorter * np.arange(500) / 499.0
     first, second = [_held(each, each.command_at[0] + grid) for each in (one, other)]
     centre: Float64 = np.mean(first, axis=0)

@@ -74,7 +74,25 @@ def test_readings_that_only_repeat_are_told(tmp_path):
     joints = motion(1)
     held = np.arange(400) // 2 * 2
     rewritten(folder, 1, {**rows(joints, held), "t_ns": joints["t_ns"]}, command(joints))
-    assert "50% of the rows repeat" in the(folder, "held_readings").text
+    assert "50% of the rows on the way repeat" in the(folder, "held_readings").text
+
+
+def test_a_joint_that_rests_is_read_anew_all_the_same(tmp_path):
+    folder = written(tmp_path)
+    joints = motion(1)
+    rests = np.minimum(np.arange(400), 150)
+    rewritten(folder, 1, {**rows(joints, rests), "t_ns": joints["t_ns"]}, command(joints))
+    assert "held_readings" not in [each.name for each in read_dataset(folder).caveats]
+
+
+def test_a_reading_that_no_joint_was_at_is_told(tmp_path):
+    folder = written(tmp_path)
+    joints = motion(1)
+    joints["q_elbow"][200] = -3.14
+    rewritten(folder, 1, joints)
+    found = the(folder, "spikes")
+    assert "joint 'elbow' jumps away for one reading and back, at 2.000 s" in found.text
+    assert "leave such rows out" in found.text
 
 
 def test_a_coarse_encoder_is_told(tmp_path):
@@ -151,6 +169,17 @@ def test_torques_that_a_controller_sends_twice_are_a_repeat_though_they_differ(t
     folder = written(tmp_path, manifest=text.replace("position", "torque"))
     assert "more noise than there is" in the(folder, "repeat_differs").text
     assert [each.name for each in read_dataset(folder).train] == ["one"]
+
+
+def test_a_repeat_may_be_shorter_than_what_it_repeats(tmp_path):
+    text = MANIFEST.replace('name = "two"\n', 'name = "two"\nrepeats = "one"\n')
+    folder = written(tmp_path, manifest=text)
+    first = {name: column[:160] for name, column in motion(0).items()}
+    rewritten(folder, 1, first, command(first))
+    table(folder / "two" / "tracker.parquet", poses(first))
+    found = read_dataset(folder)
+    assert "repeat_differs" not in [each.name for each in found.caveats]
+    assert [each.repeats for each in found.trajectories if each.name == "two"] == ["one"]
 
 
 def test_a_repeat_of_the_same_commands_is_fine(tmp_path):
