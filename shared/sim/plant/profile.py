@@ -33,6 +33,28 @@ def ramped(
     return Signal(np.r_[signal.at[0], at], np.concatenate([signal.values[:1], out]))
 
 
+def slewed(signal: Signal, speed: float, period: float, begin: float, until: float) -> Signal:
+    """Return set points that go to each command at a speed, and no faster.
+
+    Args:
+        signal: float64[C, J] commands.
+        speed: the most, either way (rad/s, m/s): what manuals of servos call a profile velocity.
+        period: of the result (s).
+        begin: where the set point rests at its command, or at the first one if that is later (s).
+        until: when the result may end (s).
+    """
+    at = instants(signal, period, begin, until)
+    targets = signal.held(at)
+    out = np.empty_like(targets)
+    place = targets[0]
+    for here, end in held_spans(targets):
+        middles: Float64 = period * (0.5 + np.arange(end - here, dtype=np.float64))
+        most = speed * np.r_[middles, period * (end - here)][:, None]
+        found = place + np.clip(targets[here] - place, -most, most)
+        out[here:end], place = found[:-1], found[-1]
+    return Signal(np.r_[signal.at[0], at], np.concatenate([signal.values[:1], out]))
+
+
 def _ramp(
     place: Float64, speed: Float64, target: Float64, acceleration: float, times: Float64
 ) -> tuple[Float64, Float64]:

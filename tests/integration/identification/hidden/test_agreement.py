@@ -14,6 +14,7 @@ EXACT = [
     ("arm3", "clock_skew", "", 3000.0, 0.05),
     ("arm3", "sample_and_hold", "", 0.0523, 0.02),
     ("arm3", "setpoint_ramp", "", 0.01, 0.02),
+    ("arm3", "setpoint_speed", "", 1.0, 0.02),
     ("arm3", "command_filter", "", 0.03, 0.02),
     ("arm3", "integral_action", "", 2.0, 0.05),
     ("arm3", "integral_action", "shoulder", 0.2, 0.05),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shared.sim.plant.profile import ramped
+from shared.sim.plant.profile import ramped, slewed
 from shared.sim.plant.signals import Signal
 
 
@@ -42,3 +42,20 @@ def test_a_ramp_may_be_followed_from_a_moment_on():
     at = np.arange(1.0, 2.0, 0.01)
     assert np.allclose(whole.held(at), later.held(at), atol=1e-9)
     assert later.at[0] == command.at[0]  # who counts from the first command still can
+
+
+def test_a_limited_speed_takes_its_time_over_a_step_and_none_over_what_is_slow():
+    found = slewed(steps(0.0, 1.0), 4.0, 1e-3, 0.0, 1.2)
+    at = found.at - 0.5
+    on_the_way = (at > -1e-9) & (at < 0.25 - 1e-9)
+    assert np.allclose(found.values[on_the_way, 0], 4.0 * (at[on_the_way] + 0.5e-3))
+    assert np.allclose(found.values[at > 0.25 - 1e-9, 0], 1.0)
+    told = Signal(np.arange(0.0, 1.0, 1e-3), 3.0 * np.arange(0.0, 1.0, 1e-3)[:, None])
+    slow = slewed(told, 4.0, 1e-3, 0.0, 1.0)
+    assert np.abs(slow.held(told.at) - told.values).max() < 3.0 * 1e-3
+
+
+def test_a_set_point_that_is_behind_goes_on_when_the_next_command_comes():
+    found = slewed(steps(0.0, 1.0, 0.0), 1.0, 1e-3, 0.0, 2.0)
+    assert found.held(np.array([0.999]))[0, 0] == pytest.approx(0.5, abs=2e-3)
+    assert found.held(np.array([1.25]))[0, 0] == pytest.approx(0.25, abs=2e-3)
