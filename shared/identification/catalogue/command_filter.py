@@ -6,13 +6,11 @@ from scipy.signal import lfilter  # pyright: ignore[reportUnknownVariableType]
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
-from shared.identification.laws.servo import servo_joints
+from shared.identification.laws.servo import EARLIER, servo_joints
 from shared.sim.plant.row import Row
 from shared.sim.plant.signals import Signal, instants
 from shared.sim.plant.structure import Structure
 
-_EARLIER = 1.0
-"""Before a part of a recording begins, from when on its commands are smoothed (s)."""
 _LEAST = 1e-6
 """A time that smooths nothing (s)."""
 _SHORTEST = 5e-3
@@ -55,7 +53,7 @@ def smoothed(signal: Signal, time: float, period: float, until: float) -> Signal
         period: of the result, each value of which is the mean over one (s).
         until: when it may end (s).
     """
-    at = instants(signal, period, -_EARLIER, until)
+    at = instants(signal, period, -EARLIER, until)
     told = signal.mean(at, period)
     kept = np.exp(-period / time)
     ends: Float64 = lfilter([1.0 - kept], [1.0, -kept], told, axis=0, zi=kept * told[:1])[0]

@@ -1,15 +1,13 @@
 """Servos ramp their set points: with limited acceleration, from where they are to each command."""
 
-from shared.identification.arm.places import moving
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
+from shared.identification.laws.servo import EARLIER, turning_servos
 from shared.sim.plant.profile import ramped
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure
 
-_EARLIER = 1.0
-"""Before a part of a recording begins, from when on its ramps are followed (s)."""
 _LEAST = 1e-6
 """One over an acceleration that is no limit (s^2/rad)."""
 
@@ -28,8 +26,7 @@ class SetpointRamp:
 
     def places(self, subject: Subject) -> tuple[str, ...]:
         """Return the whole arm, if positions of turning joints are told: servos are set alike."""
-        turns = not any(place.is_sliding for place in moving(subject))
-        return ("",) if subject.control == "position" and turns else ()
+        return turning_servos(subject)
 
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
         """Return one over the acceleration."""
@@ -46,7 +43,7 @@ class SetpointRamp:
         inverse = float(values[0])
         if inverse > _LEAST:
             acceleration, period = 1.0 / inverse, row.plant.timestep
-            row.command = ramped(row.command, acceleration, period, -_EARLIER, row.duration)
+            row.command = ramped(row.command, acceleration, period, -EARLIER, row.duration)
 
 
 EFFECT = SetpointRamp()

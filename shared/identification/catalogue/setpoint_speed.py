@@ -4,12 +4,11 @@ from shared.identification.arm.places import moving
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.identification.effect import Quantity, Side
+from shared.identification.laws.servo import EARLIER, turning_servos
 from shared.sim.plant.profile import slewed
 from shared.sim.plant.row import Row
 from shared.sim.plant.structure import Structure
 
-_EARLIER = 1.0
-"""Before a part of a recording begins, from when on its set points are followed (s)."""
 _LEVELS = (0.5, 0.7, 0.85, 1.0, 1.2, 1.5, 2.0, 3.0)
 """Of the speed of the fastest joint over the limit."""
 
@@ -24,8 +23,7 @@ class SetpointSpeed:
 
     def places(self, subject: Subject) -> tuple[str, ...]:
         """Return the whole arm, if positions of turning joints are told: servos are set alike."""
-        turns = not any(place.is_sliding for place in moving(subject))
-        return ("",) if subject.control == "position" and turns else ()
+        return turning_servos(subject)
 
     def quantities(self, subject: Subject, place: str) -> tuple[Quantity, ...]:
         """Return one over the speed; searched on a grid, as a limit not reached changes nothing."""
@@ -46,7 +44,7 @@ class SetpointSpeed:
         inverse = float(values[0])
         if inverse > 0.0:
             period = row.plant.timestep
-            row.command = slewed(row.command, 1.0 / inverse, period, -_EARLIER, row.duration)
+            row.command = slewed(row.command, 1.0 / inverse, period, -EARLIER, row.duration)
 
 
 EFFECT = SetpointSpeed()

@@ -142,26 +142,28 @@ def of_joints(trajectory: Trajectory, joints: Sequence[str]) -> list[Caveat]:
     name, found = trajectory.name, list[Caveat]()
     q, times = trajectory.q, trajectory.joints_at
     steps = np.diff(q, axis=0)
-    still = np.all(steps == 0.0, axis=1)[_on_the_way(q)]
+    speeds = steps / np.diff(times)[:, None]
+    least = [step_of(column) for column in q.T]
+    still = np.all(steps == 0.0, axis=1)[_on_the_way(q, least)]
     if len(still) > 20 and 0.3 < float(still.mean()) < 0.98:
         found.append(Caveat("held_readings", name, (
             f"{still.mean():.0%} of the rows on the way repeat the reading before: the log is "
             "faster than the joints are read; write each reading once"
         )))  # fmt: skip
     for index, joint in enumerate(joints):
-        speed = float(np.quantile(np.abs(steps[:, index] / np.diff(times)), 0.99))
+        speed = float(np.quantile(np.abs(speeds[:, index]), 0.99))
         if speed > HIGHEST_SPEED:
             found.append(Caveat("fast", name, (
                 f"joint {joint!r} goes at {speed:.3g} rad/s (m/s) by its positions: are they in "
                 "degrees or mm, or noisy?"
             )))  # fmt: skip
-        if rows := _spikes(steps[:, index] / np.diff(times)):
+        if rows := _spikes(speeds[:, index]):
             at = ", ".join(f"{times[row]:.3f}" for row in rows[:3])
             found.append(Caveat("spikes", name, (
                 f"joint {joint!r} jumps away for one reading and back, at {at} s"
                 f"{' and more often' if len(rows) > 3 else ''}: leave such rows out"
             )))  # fmt: skip
-        if (step := step_of(q[:, index])) > COARSE:
+        if (step := least[index]) > COARSE:
             values = len(np.unique(q[:, index]))
             found.append(Caveat("quantised", name, (
                 f"joint {joint!r} is read in steps of {step:.3g} rad (m), {values} values in "
@@ -178,15 +180,15 @@ def of_joints(trajectory: Trajectory, joints: Sequence[str]) -> list[Caveat]:
     return found
 
 
-def _on_the_way(q: Float64) -> NDArray[np.bool_]:
+def _on_the_way(q: Float64, least: Sequence[float]) -> NDArray[np.bool_]:
     """Return bool[T - 1], which readings come while a joint goes on by many of its least steps.
 
     A joint that rests, or creeps from one step of its encoder to the next, is read anew each time.
     """
     out = np.zeros(max(len(q) - 1, 0), np.bool_)
-    for column in q.T:
+    for column, step in zip(q.T, least, strict=True):
         gone = np.abs(column[AROUND:] - column[:-AROUND])
-        out[np.flatnonzero(gone > AROUND * step_of(column)) + AROUND // 2] = True
+        out[np.flatnonzero(gone > AROUND * step) + AROUND // 2] = True
     return out
 
 

@@ -31,6 +31,7 @@ def fit_to_all(found: Search, left: Sequence[Unexplained]) -> None:
         found: the search, over.
         left: what its model does not explain.
     """
+    found.final, found.fitted_to, found.by_all = None, (), None
     problem, current = found.problem, found.current
     pushed = {each.trajectory for each in left if each.is_external}
     names = [each.name for each in problem.dataset.trajectories]

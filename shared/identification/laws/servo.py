@@ -1,6 +1,7 @@
 """What the servos of a joint give together."""
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -8,6 +9,9 @@ from shared.identification.arm.places import moving
 from shared.identification.arm.subject import Subject
 from shared.identification.dataset.types import Float64
 from shared.sim.plant.row import Row, drives_of
+
+EARLIER: Final = 1.0
+"""Before a part of a recording begins, from when on its set points are followed (s)."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,12 @@ def servo_joints(subject: Subject) -> tuple[str, ...]:
     plant, model = subject.plant, subject.nominal.model
     labels = (place.label for place in moving(subject))
     return tuple(label for label in labels if drives_of(plant, model, label))
+
+
+def turning_servos(subject: Subject) -> tuple[str, ...]:
+    """Return the place of what set points of turning joints have alike, if positions are told."""
+    turns = not any(place.is_sliding for place in moving(subject))
+    return ("",) if subject.control == "position" and turns else ()
 
 
 def together_or_apart(labels: tuple[str, ...]) -> tuple[str, ...]:

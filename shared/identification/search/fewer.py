@@ -22,11 +22,11 @@ def prune(found: Search, train: tuple[int, ...], test: tuple[int, ...]) -> None:
     that one swing reaches is too seldom seen to follow surely, but nothing else makes up for it.
     """
     base = float(found.base_losses.mean())
-    for each in _doubtful(found.accepted)[::-1]:
+    for each in doubtful(found.accepted)[::-1]:
         is_told = not found.rivals[found.accepted.index(each)]
         if is_told and not _is_there(found.current, each.candidate, train, test):
             take_back(found, each, without(found, each, train, test))
-    for each in _doubtful(found.accepted[:-1]):
+    for each in doubtful(found.accepted[:-1]):
         others = without(found, each, train, test)
         if compare(others.losses, found.current_losses, found.rng).is_sure:
             continue  # the rest does much worse without it
@@ -43,7 +43,7 @@ def _is_there(
     return is_there(polish(fit.space, fit.z, everything, 2), candidate, everything)
 
 
-def _doubtful(accepted: list[Tried]) -> list[Tried]:
+def doubtful(accepted: list[Tried]) -> list[Tried]:
     """Return what was accepted for itself, and not as something that happened once."""
     return [one for one in accepted if not one.is_event and not one.is_relative]
 

@@ -141,12 +141,12 @@ def _round(
     if not sure:
         return False
     unsure = [one for one in useful if one not in sure and _is_of_links(one)]
-    alike = loads_alike(sure)
-    sure = [_at_best(found, one, train) if one in alike else one for one in sure]
-    best, rivals = simplest(sure, found.rng)
+    at_best = {one.candidate: _at_best(found, one, train) for one in loads_alike(sure)}
+    best, rivals = simplest([at_best.get(one.candidate, one) for one in sure], found.rng)
     rivals += as_well(best, unsure, found.rng)
     rivals = tuple(one for one in rivals if is_rival(found, best, one, train, test))
-    best = _at_best(found, best, train)
+    if best.candidate not in at_best:
+        best = _at_best(found, best, train)
     best, rivals, family = _elsewhere(found, best, rivals, train, test, progress)
     found.accepted.append(best)
     found.rivals.append(rivals)

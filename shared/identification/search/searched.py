@@ -162,8 +162,8 @@ class Left(NamedTuple):
 
     nominal: float
     base: float
-    freer: float
-    """A base that may bend more, see ``Search.freer``; as much as ``base`` if there is none."""
+    to_explain: float
+    """What the base leaves, or one that may bend more if that is less, see ``Search.freer``."""
     current: float
     by_all: float | None
 
@@ -239,7 +239,8 @@ class Search:
             for each in (self.nominal_losses, self.base_losses, self.current_losses)
         )
         freer = base if self.freer is None else float(self.freer.losses.mean())
-        return Left(nominal, base, freer, current, None if self.by_all is None else self.by_all.new)
+        by_all = None if self.by_all is None else self.by_all.new
+        return Left(nominal, base, min(base, freer), current, by_all)
 
     @property
     def plainly(self) -> Left:
@@ -250,7 +251,7 @@ class Search:
             own = self.freer.fit.space.problem
             freer = float(plain_losses_of(own, self.freer).mean())
         by_all = None if self.by_all is None else self.by_all.plain
-        return Left(nominal, base, freer, current, by_all)
+        return Left(nominal, base, min(base, freer), current, by_all)
 
     @property
     def told(self) -> Fit:
@@ -316,7 +317,7 @@ def _most(found: Search, left: Left) -> float:
     if not found.accepted:
         return NEARLY_NOISE
     is_exact = all(one.candidate.effect.side in EXACT for one in found.accepted)
-    share = 0.0 if is_exact else MAY_BE_LEFT * min(left.base, left.freer)
+    share = 0.0 if is_exact else MAY_BE_LEFT * left.to_explain
     if found.doubted:
         share = min(share, max(BESIDE_A_DOUBT, HARDLY_ANY * left.base))
     return max(BESIDE_A_NAME, share)

@@ -7,7 +7,7 @@ import numpy as np
 from shared.identification.dataset.types import Float64
 from shared.identification.fitting.whole import fit_to_all
 from shared.identification.gate.certainty import CALIBRATED, half_widths, is_there
-from shared.identification.search.fewer import take_back, without
+from shared.identification.search.fewer import doubtful, take_back, without
 from shared.identification.search.searched import Search, Tried, is_open
 from shared.identification.verdict import Unexplained
 
@@ -42,14 +42,11 @@ def take_back_sizeless(found: Search, left: Sequence[Unexplained]) -> None:
         left: what its model does not explain.
     """
     train, test = found.problem.of("train"), found.problem.of("test")
-    for each in found.accepted[::-1]:
-        is_told = not (each.is_event or each.is_relative)
-        is_told = is_told and not found.rivals[found.accepted.index(each)]
-        if not is_told or is_open(found) or not _may_be_nothing(found, each):
-            continue
-        take_back(found, each, without(found, each, train, test))
-        found.final, found.fitted_to, found.by_all = None, (), None
-        fit_to_all(found, left)
+    for each in doubtful(found.accepted)[::-1]:
+        is_told = not found.rivals[found.accepted.index(each)]
+        if is_told and _may_be_nothing(found, each) and not is_open(found):
+            take_back(found, each, without(found, each, train, test))
+            fit_to_all(found, left)
 
 
 def _may_be_nothing(found: Search, each: Tried) -> bool:

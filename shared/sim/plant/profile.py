@@ -1,5 +1,7 @@
 """Set points that ramp towards a command: what the firmware of many a servo makes of a step."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from shared.sim.arm import Float64
@@ -21,16 +23,14 @@ def ramped(
         begin: where the set point rests at its command, or at the first one if that is later (s).
         until: when the result may end (s).
     """
-    at = instants(signal, period, begin, until)
-    targets = signal.held(at)
-    out = np.empty_like(targets)
-    place, speed = targets[0], np.zeros(targets.shape[1])
-    for here, end in held_spans(targets):
-        middles: Float64 = period * (0.5 + np.arange(end - here, dtype=np.float64))
-        times = np.r_[middles, period * (end - here)]
-        found, speed = _ramp(place, speed, targets[here], acceleration, times)
-        out[here:end], place = found[:-1], found[-1]
-    return Signal(np.r_[signal.at[0], at], np.concatenate([signal.values[:1], out]))
+    speed = np.zeros(signal.values.shape[1])
+
+    def go(place: Float64, target: Float64, times: Float64) -> Float64:
+        nonlocal speed
+        found, speed = _ramp(place, speed, target, acceleration, times)
+        return found
+
+    return _followed(signal, go, period, begin, until)
 
 
 def slewed(signal: Signal, speed: float, period: float, begin: float, until: float) -> Signal:
@@ -43,14 +43,27 @@ def slewed(signal: Signal, speed: float, period: float, begin: float, until: flo
         begin: where the set point rests at its command, or at the first one if that is later (s).
         until: when the result may end (s).
     """
+
+    def go(place: Float64, target: Float64, times: Float64) -> Float64:
+        most = speed * times[:, None]
+        return place + np.clip(target - place, -most, most)
+
+    return _followed(signal, go, period, begin, until)
+
+
+_Way = Callable[[Float64, Float64, Float64], Float64]
+"""From float64[J] to a target float64[J]: returns float64[K, J], where it is after times (s)."""
+
+
+def _followed(signal: Signal, go: _Way, period: float, begin: float, until: float) -> Signal:
+    """Return where a set point is in the middle of each period, which goes on from way to way."""
     at = instants(signal, period, begin, until)
     targets = signal.held(at)
     out = np.empty_like(targets)
     place = targets[0]
     for here, end in held_spans(targets):
         middles: Float64 = period * (0.5 + np.arange(end - here, dtype=np.float64))
-        most = speed * np.r_[middles, period * (end - here)][:, None]
-        found = place + np.clip(targets[here] - place, -most, most)
+        found = go(place, targets[here], np.r_[middles, period * (end - here)])
         out[here:end], place = found[:-1], found[-1]
     return Signal(np.r_[signal.at[0], at], np.concatenate([signal.values[:1], out]))
 

@@ -5,7 +5,10 @@ import numpy as np
 from shared.sim.arm import Float64
 from shared.sim.hidden.effect import Case, Hidden, servos_alike
 from shared.sim.hidden.robot import Hold, Robot
-from shared.sim.plant.signals import Signal
+from shared.sim.hidden.setpoints import followed
+
+_PARTS = 2
+"""Steps of the set point in one of the physics."""
 
 
 def _enter(robot: Robot, case: Case) -> None:
@@ -18,25 +21,18 @@ def _filter(acceleration: float, timestep: float) -> Hold:
     In halves of a step: a command comes where one begins, and steps of drives begin half of one
     earlier.
     """
-    half = 0.5 * timestep
+    half = timestep / _PARTS
     most = acceleration * half
-    place, speed = np.empty(0), np.empty(0)
+    speed: Float64 = np.zeros(1)
 
-    def hold(time: float, command: Signal) -> Float64:
-        nonlocal place, speed
-        targets = command.held(np.array([time, time + half]))
-        if not place.size:
-            place, speed = targets[0], np.zeros_like(targets[0])
-        passed = [place]
-        for target in targets:
-            left = target - place
-            fastest = np.sqrt(most**2 + 2.0 * acceleration * np.abs(left)) - most
-            speed = speed + np.clip(np.sign(left) * fastest - speed, -most, most)
-            place = place + half * speed
-            passed.append(place)
-        return 0.25 * (passed[0] + 2.0 * passed[1] + passed[2])
+    def move(place: Float64, target: Float64) -> Float64:
+        nonlocal speed
+        left = target - place
+        fastest = np.sqrt(most**2 + 2.0 * acceleration * np.abs(left)) - most
+        speed = speed + np.clip(np.sign(left) * fastest - speed, -most, most)
+        return place + half * speed
 
-    return hold
+    return followed(timestep, _PARTS, move)
 
 
 HIDDEN = Hidden(

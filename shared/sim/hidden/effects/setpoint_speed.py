@@ -5,7 +5,7 @@ import numpy as np
 from shared.sim.arm import Float64
 from shared.sim.hidden.effect import Case, Hidden, Scene, servos_alike
 from shared.sim.hidden.robot import Hold, Robot
-from shared.sim.plant.signals import Signal
+from shared.sim.hidden.setpoints import followed
 
 _PARTS = 4
 """Steps of the set point in one of the physics."""
@@ -18,27 +18,17 @@ def _sizes(scene: Scene, place: str) -> tuple[float, float]:
 
 
 def _enter(robot: Robot, case: Case) -> None:
-    robot.hold = lambda: _follow(1.0 / case.size, robot.timestep / _PARTS)
+    robot.hold = lambda: _follow(1.0 / case.size, robot.timestep)
 
 
-def _follow(speed: float, short: float) -> Hold:
+def _follow(speed: float, timestep: float) -> Hold:
     """Return what takes a set point towards its command in short steps."""
-    begins: Float64 = short * np.arange(_PARTS, dtype=np.float64)
-    place = np.empty(0)
+    most = speed * timestep / _PARTS
 
-    def hold(time: float, command: Signal) -> Float64:
-        nonlocal place
-        targets = command.held(time + begins)
-        if not place.size:
-            place = targets[0]
-        passed: list[Float64] = []
-        for target in targets:
-            after = place + np.clip(target - place, -speed * short, speed * short)
-            passed.append(0.5 * (place + after))
-            place = after
-        return np.mean(passed, axis=0)
+    def move(place: Float64, target: Float64) -> Float64:
+        return place + np.clip(target - place, -most, most)
 
-    return hold
+    return followed(timestep, _PARTS, move)
 
 
 HIDDEN = Hidden(
