@@ -65,7 +65,9 @@ def _followed(signal: Signal, go: _Way, period: float, begin: float, until: floa
         middles: Float64 = period * (0.5 + np.arange(end - here, dtype=np.float64))
         found = go(place, targets[here], np.r_[middles, period * (end - here)])
         out[here:end], place = found[:-1], found[-1]
-    return Signal(np.r_[signal.at[0], at], np.concatenate([signal.values[:1], out]))
+    before = signal.at[:1] < at[0]  # who counts from the first command still can
+    values = np.concatenate([signal.values[:1][before], out])
+    return Signal(np.r_[signal.at[:1][before], at], values)
 
 
 def _ramp(

@@ -28,7 +28,7 @@ def test_a_command_that_comes_on_the_way_is_reached_from_where_it_is_and_as_fast
     command = Signal(0.01 * np.arange(100), np.cumsum(rng.normal(0.0, 0.05, (100, 2)), axis=0))
     period, most = 1e-3, 20.0
     found = ramped(command, most, period, 0.0, 1.3)
-    places = found.values[1:]
+    places = found.values
     bends = np.diff(places, 2, axis=0) / period**2
     assert np.abs(bends).max() <= most * (1.0 + 1e-6)
     assert np.abs(np.abs(bends) - most).min() < 1e-6
@@ -42,6 +42,7 @@ def test_a_ramp_may_be_followed_from_a_moment_on():
     at = np.arange(1.0, 2.0, 0.01)
     assert np.allclose(whole.held(at), later.held(at), atol=1e-9)
     assert later.at[0] == command.at[0]  # who counts from the first command still can
+    assert np.diff(whole.at).min() > 0.0  # who asks for its speed gets one
 
 
 def test_a_limited_speed_takes_its_time_over_a_step_and_none_over_what_is_slow():
