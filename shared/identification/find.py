@@ -370,16 +370,11 @@ def _not_fitted_to(found: Search) -> tuple[str, ...]:
 
 
 def _record_next(conclusion: Conclusion, dataset: Dataset) -> tuple[str, ...]:
-    """Return what would make the next verdict surer."""
+    """Return what would make the next verdict surer, what takes least first."""
     out = [tie.record for tie in conclusion.ties]
     names = {each.name for each in dataset.caveats}
     if "no_repeat" in names:
         out.append("Repeat one recording: without a repeat the noise floor is a guess.")
-    if "no_tracker" in names:
-        out.append(
-            "Log a tracker beside the joints: what gives or lies behind the encoders does not "
-            "show without one."
-        )
     if "no_effort" in names and dataset.control == "position" and conclusion.word != "none":
         out.append(
             "Log efforts beside the joints, torques or currents: of a servo how strong it is, how "
@@ -388,5 +383,10 @@ def _record_next(conclusion: Conclusion, dataset: Dataset) -> tuple[str, ...]:
     if conclusion.word in ("unexplained", "base_too_coarse"):
         out.append(
             "Record the whole programme that riposte identify excite designs, joint by joint."
+        )
+    if "no_tracker" in names:
+        out.append(
+            "Log a tracker beside the joints: what gives or lies behind the encoders does not "
+            "show without one."
         )
     return tuple(out)

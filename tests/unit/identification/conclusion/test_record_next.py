@@ -30,3 +30,9 @@ def test_repeats_trackers_and_the_whole_programme_are_asked_for_where_they_lack(
     assert "Repeat one recording" in told("none", "pose", "no_repeat")
     assert "Log a tracker" in told("none", "pose", "no_tracker")
     assert "riposte identify excite" in told("unexplained", "pose")
+
+
+def test_another_instrument_is_asked_for_last():
+    told_of_all = told("unexplained", "position", "no_tracker", "no_effort", "no_repeat")
+    at = [told_of_all.index(word) for word in ("Repeat", "Log efforts", "excite", "Log a tracker")]
+    assert at == sorted(at)
