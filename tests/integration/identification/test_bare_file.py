@@ -17,6 +17,7 @@ def _sizes(verdict: Verdict, effect: str) -> dict[str, float]:
     return {each.where: each.value for each in verdict.causes if each.effect == effect}
 
 
+@pytest.mark.timeout(400)
 def test_friction_dampers_and_rotors_of_every_joint_are_named(tmp_path: Path):
     verdict = identify(problem_of_geared(tmp_path, is_bare=True).dataset).verdict
     assert verdict.verdict == "named", verdict.sentence
