@@ -16,6 +16,7 @@ from shared.identification.dataset.caveats import in_words
 from shared.identification.dataset.types import Dataset, with_encoders, with_timestep
 from shared.identification.effect import Effect
 from shared.identification.fitting.base import SavedFits
+from shared.identification.fitting.drive_limits import low_limits
 from shared.identification.fitting.lead import ahead_of_commands
 from shared.identification.fitting.problem import BLOCK, Span, Variant
 from shared.identification.fitting.saved import fits_of, load, save
@@ -306,6 +307,7 @@ def _verdict(
                     _shorter_step(found, dataset),
                     _beyond_gears(found, dataset),
                     coarse_step(found.base),
+                    low_limits(found.base),
                     ahead_of_commands(found.told),
                     counted_by_torque(found.problem.noise),
                 ],

@@ -19,7 +19,7 @@ from shared.identification.fitting.lacking import Lacking
 from shared.identification.fitting.parameters import BaseParameter, enter_base
 from shared.identification.noise.blocks import Bins, beside
 from shared.identification.noise.floor import Noise
-from shared.sim.plant.plant import stepped
+from shared.sim.plant.plant import Plant, stepped
 from shared.sim.plant.replay import Reports
 from shared.sim.plant.rollouts import Entry, Rollouts, as_it_is
 from shared.sim.plant.row import Row
@@ -122,6 +122,15 @@ class Problem:
         """Return the same with first states as free as a variant answers them."""
         arms = self._compiled(self.structure(variant), None)
         return replace(self, free_starts=FreeStarts(arms, self.entry(variant)))
+
+    def with_plant(self, plant: Plant) -> "Problem":
+        """Return the same recordings of another arm, which has the same numbers in its base."""
+        known = self.subject.nominal
+        nominal = Rollouts(plant, (), known.capacity, known.threads)
+        return Problem(
+            replace(self.subject, plant=plant, nominal=nominal), self.dataset, self.parameters,
+            self.noise, self.window, aside=self.aside, free_starts=self.free_starts,
+        )  # fmt: skip
 
     def without(self, gone: Sequence[int]) -> "Problem":
         """Return the same with some parameters as the model file has them, by their places."""

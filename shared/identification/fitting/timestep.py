@@ -5,15 +5,11 @@ half a step times its damping more inertia. Encoders that are read to 0.01 mrad 
 and a fit makes up for it with an armature that is too small, as far as there is one.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
 from shared.identification.dataset.types import Float64
 from shared.identification.fitting.fit import Fit
-from shared.identification.fitting.problem import Problem
 from shared.sim.plant.plant import stepped
-from shared.sim.plant.rollouts import Rollouts
 
 _MUCH = 1.0
 """Root mean square of a joint, in noise floors, from which it is told."""
@@ -36,14 +32,8 @@ def changed_by(fit: Fit, timestep: float) -> Float64:
     """Return float64[J], by how much another time step (s) moves joints, in noise floors (RMS)."""
     problem, variant = fit.space.problem, fit.variant
     test = problem.of("test")
-    plant = stepped(problem.subject.plant, timestep)
-    nominal = Rollouts(plant, (), len(test), problem.subject.nominal.threads)
-    subject = replace(problem.subject, plant=plant, nominal=nominal)
-    other = Problem(
-        subject, problem.dataset, problem.parameters, problem.noise, problem.window,
-        aside=problem.aside, free_starts=problem.free_starts,
-    )  # fmt: skip
-    joints = len(subject.joints)
+    other = problem.with_plant(stepped(problem.subject.plant, timestep))
+    joints = len(problem.subject.joints)
     before, after = (each.plain(variant, test) for each in (problem, other))
     changed = [one[:, :joints] - two[:, :joints] for one, two in zip(before, after, strict=True)]
     return np.sqrt(np.mean(np.concatenate(changed) ** 2, axis=0))

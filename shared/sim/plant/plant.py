@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import mujoco
+import numpy as np
 
 from shared.errors import IdentificationError
 from shared.sim.build import AGENTS, build_spec
@@ -223,6 +224,29 @@ def stepped(plant: Plant, timestep: float) -> Plant:
 
     rough = plant.timestep if timestep < plant.timestep else None
     return replace(plant, make=make, timestep=timestep, rough_timestep=rough)
+
+
+def stronger(plant: Plant, joints: Sequence[str], times: float) -> Plant:
+    """Return the same arm with drives of some logged joints that may give more.
+
+    Args:
+        plant: the arm.
+        joints: what the log calls them.
+        times: what each of their limits, if the model file has one, is multiplied by.
+    """
+    names = {plant.mj_joint(label) for label in joints}
+
+    def make() -> mujoco.MjSpec:
+        spec = plant.make()
+        for actuator in spec.actuators:
+            if actuator.trntype == mujoco.mjtTrn.mjTRN_JOINT and actuator.target in names:
+                actuator.forcerange = times * np.array(actuator.forcerange)
+        for name in names:
+            joint = spec.joint(name)
+            joint.actfrcrange = times * np.array(joint.actfrcrange)
+        return spec
+
+    return replace(plant, make=make)
 
 
 @dataclass(frozen=True)
