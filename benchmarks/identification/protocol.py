@@ -26,7 +26,7 @@ _ARMS: tuple[ArmName, ...] = ("pr2", "arm3")
 """By turns; effects that neither can have go to ``torque2``."""
 _LATER: Final = (
     "setpoint_ramp", "integral_action", "velocity_feedforward", "command_filter",
-    "setpoint_speed",
+    "setpoint_speed", "dead_band",
 )  # fmt: skip
 """Effects that the protocol began without: their trials are numbered after all others."""
 

@@ -18,6 +18,8 @@ EXACT = [
     ("arm3", "command_filter", "", 0.03, 0.02),
     ("arm3", "integral_action", "", 2.0, 0.05),
     ("arm3", "integral_action", "shoulder", 0.2, 0.05),
+    ("arm3", "dead_band", "", 0.02, 0.05),
+    ("arm3", "dead_band", "elbow", 0.01, 0.05),
     ("arm3", "velocity_feedforward", "", 1.0, 0.06),
     ("arm3", "velocity_feedforward", "elbow", 0.5, 0.06),
     ("arm3", "dropped_packets", "", 0.15, 0.02),

@@ -8,6 +8,7 @@ import pytest
 from shared.identification.arm.subject import Subject
 from shared.identification.catalogue.command_filter import EFFECT as FILTER
 from shared.identification.catalogue.command_filter import smoothed
+from shared.identification.catalogue.dead_band import EFFECT as DEAD_BAND
 from shared.identification.catalogue.integral_action import EFFECT as INTEGRAL
 from shared.identification.catalogue.velocity_feedforward import EFFECT as FEEDFORWARD
 from shared.identification.dataset.types import Float64
@@ -24,7 +25,7 @@ _RAIL = """<mujoco><compiler angle="radian"/><option timestep="0.002" gravity="0
 <inertial pos="0 0 0" mass="2" diaginertia="2 2 2"/></body></worldbody>
 <actuator><position name="cart" joint="cart" kp="90" kv="45" gear="{gear}"/></actuator></mujoco>"""
 """2 kg behind a spring-damper."""
-CONTROLLERS = [FILTER, INTEGRAL, FEEDFORWARD]
+CONTROLLERS = [FILTER, INTEGRAL, FEEDFORWARD, DEAD_BAND]
 
 
 def _cart(folder: Path, joint: str = "", gear: float = 1.0) -> Subject:
@@ -82,6 +83,48 @@ def test_an_integral_counts_its_error_behind_a_gear(tmp_path: Path) -> None:
     assert found.q[-1, 0] == pytest.approx(
         0.5 - (0.5 - start) * np.exp(-5.94 * 360 / 370), abs=2e-4
     )
+
+
+@pytest.mark.parametrize("gear", [1.0, 2.0])
+def test_beyond_a_dead_band_a_servo_begins_from_its_edge(tmp_path: Path, gear: float) -> None:
+    subject = _cart(tmp_path, 'stiffness="10"', gear=gear)
+    stiffness = 90.0 * gear**2
+    held = recorded([0.5 * gear], 6.0, [0.3])
+    found = replay(subject, held, DEAD_BAND, "cart", [0.02])
+    # stiffness (0.5 - 0.02 - q) = 10 q
+    assert found.q[-1, 0] == pytest.approx(stiffness * 0.48 / (stiffness + 10.0), abs=1e-5)
+
+
+def test_within_a_dead_band_a_joint_stays_where_it_is(tmp_path: Path) -> None:
+    subject = _cart(tmp_path)
+    found = replay(subject, recorded([0.5], 2.0, [0.49]), DEAD_BAND, "cart", [0.02])
+    np.testing.assert_allclose(found.q[:, 0], 0.49, atol=2e-6)
+    assert subject.control == "position"
+    assert [each.unit for each in DEAD_BAND.quantities(subject, "cart")] == ["m"]
+
+
+def test_a_dead_band_that_is_less_at_one_joint_is_taken_off_that_of_all(tmp_path: Path) -> None:
+    subject = make_subject(make_plant(tmp_path))
+    sagging = recorded([0.0, 0.0, 0.0], 2.0, [0.0, 0.02, 0.0])
+
+    def without_lift(row: Row) -> None:
+        DEAD_BAND.enter(row, "", np.array([0.01]))
+        DEAD_BAND.enter(row, "lift", np.array([-0.01]))
+
+    def apart(row: Row) -> None:
+        for place in ("pan", "elbow"):
+            DEAD_BAND.enter(row, place, np.array([0.01]))
+
+    def taken_back(row: Row) -> None:
+        DEAD_BAND.enter(row, "elbow", np.array([0.01]))
+        DEAD_BAND.enter(row, "elbow", np.array([-0.01]))
+
+    one, other, none = Rollouts(subject.plant, (), 3).run(
+        [(without_lift, sagging), (apart, sagging), (taken_back, sagging)]
+    )
+    np.testing.assert_allclose(one.q, other.q, atol=1e-12)
+    np.testing.assert_array_equal(none.q, replay(subject, sagging).q)
+    assert np.abs(one.q - none.q).max() > 1e-3
 
 
 def test_an_integral_of_one_joint_adds_to_that_of_all(tmp_path: Path) -> None:
@@ -162,7 +205,7 @@ def test_controllers_are_where_positions_are_told(tmp_path: Path, effect: Effect
     assert effect.places(motors) == ()
 
 
-@pytest.mark.parametrize("effect", [INTEGRAL, FEEDFORWARD], ids=lambda each: each.name)
+@pytest.mark.parametrize("effect", [INTEGRAL, FEEDFORWARD, DEAD_BAND], ids=lambda each: each.name)
 def test_of_one_joint_that_moves_all_of_them_are_not_told_apart(
     tmp_path: Path, effect: Effect
 ) -> None:
