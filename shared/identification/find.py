@@ -13,7 +13,12 @@ from shared.identification.conclusion.conclude import Conclusion, conclude, exte
 from shared.identification.conclusion.evidence import Evidence
 from shared.identification.conclusion.gathered import evidence_of
 from shared.identification.dataset.caveats import in_words
-from shared.identification.dataset.types import Dataset, with_encoders, with_timestep
+from shared.identification.dataset.types import (
+    Dataset,
+    with_encoders,
+    with_timestep,
+    without_limits,
+)
 from shared.identification.effect import Effect
 from shared.identification.fitting.base import SavedFits
 from shared.identification.fitting.drive_limits import low_limits
@@ -105,12 +110,17 @@ def identify(
 
     def begun_at(step: float, aside: tuple[Span, ...] = ()) -> Search:
         progress("base fit", 0.0, f"again, at a time step of {1e3 * step:g} ms")
-        return begun(with_timestep(dataset, step), folder_of("shorter_step"), aside)
+        return begun(with_timestep(own, step), folder_of("shorter_step"), aside)
 
-    begins = begun(dataset, resume_folder)
+    own = dataset
+    begins = begun(own, resume_folder)
+    if low := low_limits(begins.base):
+        progress("base fit", 0.0, f"again, with no limit of the drive of {listing(low)}")
+        own = without_limits(dataset, low)
+        begins = begun(own, folder_of("without_limits"))
     if aside := led_astray(begins):
         progress("base fit", 0.0, f"again, {_without(aside)}")
-        begins = begun(dataset, folder_of("not_led_astray"), aside)
+        begins = begun(own, folder_of("not_led_astray"), aside)
     if (
         begins.problem.noise.has_free_starts
         and (step := shorter(begins.base, _STEP_SHOWS)) is not None
@@ -286,7 +296,7 @@ def _verdict(
 ) -> Verdict:
     return Verdict(
         verdict=conclusion.word,
-        sentence=conclusion.sentence,
+        sentence=f"{conclusion.sentence}{_beyond_limits(found)}",
         causes=conclusion.causes,
         ties=conclusion.ties,
         unexplained=left,
@@ -307,7 +317,7 @@ def _verdict(
                     _shorter_step(found, dataset),
                     _beyond_gears(found, dataset),
                     coarse_step(found.base),
-                    low_limits(found.base),
+                    _without_limits(found),
                     ahead_of_commands(found.told),
                     counted_by_torque(found.problem.noise),
                 ],
@@ -324,6 +334,7 @@ def _verdict(
         cpu_s=sum(seconds.values()),
         seconds=seconds,
         timestep=found.problem.subject.plant.timestep,
+        unlimited=found.problem.dataset.source.unlimited,
     )
 
 
@@ -348,6 +359,27 @@ def _beyond_gears(found: Search, dataset: Dataset) -> str:
         "encoders are taken to sit beyond the gears, on the links: at the motors they leave more "
         'than noise unexplained. Write encoders = "link" into [model] of dataset.toml if that is '
         'so, or encoders = "motor"'
+    )
+
+
+def _beyond_limits(found: Search) -> str:
+    """Return a sentence on drives that are taken to give more than the file says, if any are."""
+    joints = found.problem.dataset.source.unlimited
+    if not joints:
+        return ""
+    return f" All this is without the file's limits of the drives at {listing(joints)}."
+
+
+def _without_limits(found: Search) -> str:
+    """Return in words why such limits are left out; empty if none is."""
+    joints = found.problem.dataset.source.unlimited
+    if not joints:
+        return ""
+    return (
+        f"the model file's drives are at their limits where the arm's are not, at "
+        f"{listing(joints)}: with these limits the base leaves twice as much or more, so they are "
+        "left out. Look up what the drives give, and correct forcerange and actuatorfrcrange; "
+        "model.xml has ten times the file's"
     )
 
 

@@ -186,5 +186,7 @@ class Verdict(_Part, frozen=True, kw_only=True):
     cpu_s: float
     seconds: dict[str, float]
     """CPU seconds by stage."""
+    unlimited: tuple[str, ...] = ()
+    """Joints whose drives were taken to give far more than the model file says."""
     timestep: float | None = None
     """Of the physics by which all of it was found (s); older verdicts do not say."""

@@ -15,7 +15,7 @@ from shared.identification.arm.slips import slips_of
 from shared.identification.arm.starts import Starts, starts_apart
 from shared.identification.dataset.types import POSE, Dataset, Float64, ModelSource, Trajectory
 from shared.sim.plant.inverse import inverse_dynamics
-from shared.sim.plant.plant import Control, Plant, is_weightless, mjcf, pr2, stepped
+from shared.sim.plant.plant import Control, Plant, is_weightless, mjcf, pr2, stepped, unlimited
 from shared.sim.plant.replay import Recorded
 from shared.sim.plant.rollouts import Rollouts
 from shared.sim.plant.signals import Signal
@@ -106,6 +106,8 @@ def plant_of(dataset: Dataset, source: ModelSource | None = None) -> Plant:
         source.tracked,
         encoders=source.encoders or "motor",
     )
+    if source.unlimited:
+        plant = unlimited(plant, source.unlimited)
     return plant if source.timestep is None else stepped(plant, source.timestep)
 
 

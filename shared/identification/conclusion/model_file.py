@@ -16,7 +16,12 @@ from numpy.typing import NDArray
 from shared.errors import IdentificationError
 from shared.identification.arm.subject import Subject, recorded_of, subject_of
 from shared.identification.catalogue import effects
-from shared.identification.dataset.types import Dataset, Float64, with_timestep
+from shared.identification.dataset.types import (
+    Dataset,
+    Float64,
+    with_timestep,
+    without_limits,
+)
 from shared.identification.effect import Effect, Quantity
 from shared.identification.fitting.parameters import base_parameters
 from shared.identification.fitting.shown import if_shown
@@ -89,7 +94,7 @@ def model_file(dataset: Dataset, verdict: Verdict) -> ModelFile:
         IdentificationError: the verdict is not of this arm, or a fitted value cannot be written.
     """
     if dataset.source.kind == "mjcf" and verdict.timestep is not None:
-        dataset = with_timestep(dataset, verdict.timestep)
+        dataset = without_limits(with_timestep(dataset, verdict.timestep), verdict.unlimited)
     subject = subject_of(dataset, capacity=1)
     entries = [_entry(subject, cause) for cause in verdict.causes]
     if dataset.source.kind == "pr2":

@@ -37,6 +37,8 @@ class ModelSource:
     tracked: str = ""
     """Site or body of an MJCF that the tracker is fixed to."""
     encoders: EncoderSide | None = None
+    unlimited: tuple[str, ...] = ()
+    """Joints whose drives give far more than the model file says."""
     """Of an MJCF's joints; None where nobody said. A servo goes by the motor's side anyway."""
     timestep: float | None = None
     """Of the physics of an MJCF (s), if it is not to be the file's."""
@@ -132,3 +134,8 @@ def with_encoders(dataset: Dataset, encoders: EncoderSide) -> Dataset:
 def with_timestep(dataset: Dataset, timestep: float) -> Dataset:
     """Return the recordings with another time step of the model's physics (s)."""
     return replace(dataset, source=replace(dataset.source, timestep=timestep))
+
+
+def without_limits(dataset: Dataset, joints: tuple[str, ...]) -> Dataset:
+    """Return the recordings with drives of some joints that give far more than the file says."""
+    return replace(dataset, source=replace(dataset.source, unlimited=joints))

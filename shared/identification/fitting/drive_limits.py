@@ -1,8 +1,9 @@
 """Whether drives of a model file are at their limits where the arm's are not.
 
 A data-sheet tells the torque that a servo may give for long; for a second it gives more. A limit
-that is lower than the arm's is found by ``torque_saturation``, one that is higher is not: what the
-file says is the most there. So it is asked what the base leaves without it.
+that is higher than the arm's is found by ``torque_saturation``, one that is lower is not: what the
+file says is the most there is, and other causes stand in for it. So it is asked what the base
+leaves without it.
 """
 
 from collections.abc import Sequence
@@ -13,23 +14,20 @@ from shared.identification.dataset.types import Float64
 from shared.identification.fitting.fit import Fit, polish
 from shared.identification.fitting.problem import Problem
 from shared.identification.fitting.space import Space
-from shared.sim.plant.plant import stronger
-from shared.telemetry.wording import listing
+from shared.sim.plant.plant import unlimited
 
-_TIMES = 10.0
-"""What limits are multiplied by to be none."""
 _REACHED = 0.1
 """What held-out motion changes by where a limit is reached, in noise floors (RMS)."""
 _BESIDE = 0.3
 """Of what the joint whose limit changes most of it does, from which another is told, too."""
 _MUCH = 1.5
 """Mean square residual of held-out motion, in noise floors, below which nothing is asked."""
-_LESS = 0.8
-"""Share of it that is left without the limits, at most, where these are told."""
+_LESS = 0.5
+"""Share of it that is left without the limits, at most, where these are not the arm's."""
 
 
-def low_limits(fit: Fit) -> str:
-    """Return in words that drives' limits are lower than the arm's; empty if they are not.
+def low_limits(fit: Fit) -> tuple[str, ...]:
+    """Return the joints whose drives' limits are lower than the arm's; none of a PR2's.
 
     Args:
         fit: of a model without causes.
@@ -37,31 +35,24 @@ def low_limits(fit: Fit) -> str:
     problem = fit.space.problem
     subject, test = problem.subject, problem.of("test")
     if subject.control == "pose":  # what a PR2's motors give is known
-        return ""
+        return ()
     before = _off(problem, fit, test)
     had = float(np.mean(before**2))
     if had < _MUCH:
-        return ""
-    free = problem.with_plant(stronger(subject.plant, subject.joints, _TIMES))
+        return ()
+    free = problem.with_plant(unlimited(subject.plant, subject.joints))
     if _change(before, _off(free, fit, test)) < _REACHED:
-        return ""
+        return ()
     without = polish(Space(free), fit.z, problem.of("train"), steps=3)
-    left = float(np.mean(_off(free, without, test) ** 2))
-    if left > _LESS * had:
-        return ""
-    plants = {label: stronger(subject.plant, (label,), _TIMES) for label in subject.joints}
+    if np.mean(_off(free, without, test) ** 2) > _LESS * had:
+        return ()
+    plants = {label: unlimited(subject.plant, (label,)) for label in subject.joints}
     changes = {
         label: _change(before, _off(problem.with_plant(plant), fit, test))
         for label, plant in plants.items()
     }
     most = max(changes.values())
-    reached = [label for label, change in changes.items() if change > _BESIDE * most]
-    return (
-        f"the model file's drives are at their limits where the arm's may not be, at "
-        f"{listing(reached)}: without these the base leaves {left**0.5:.2f} times the noise of "
-        f"held-out motion for {had**0.5:.2f}. Look up forcerange and actuatorfrcrange in the model "
-        "file, or leave them out and ask again: a limit that the arm has is found then"
-    )
+    return tuple(label for label, change in changes.items() if change > _BESIDE * most)
 
 
 def _off(problem: Problem, fit: Fit, test: Sequence[int]) -> Float64:

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from shared.sim.arm import Float64
-from shared.sim.plant.plant import Plant
+from shared.sim.plant.plant import Plant, lift_limits
 from shared.sim.plant.structure import Builder, Structure
 
 
@@ -35,6 +35,7 @@ def patched_xml(
     kind: Any = mujoco.MjSpec  # its stub lacks reading a file
     own: mujoco.MjSpec = kind.from_file(str(path))
     own.option.timestep = plant.timestep
+    lift_limits(own, plant)
     original = own.compile()
     if not structure and _actuators(original) == _actuators(compiled):
         spec, compiled = own, original

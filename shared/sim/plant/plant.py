@@ -33,6 +33,8 @@ _ALONE = int(_OFF.mjDSBL_CONTACT) | int(_OFF.mjDSBL_AUTORESET) | int(_OFF.mjDSBL
 PR2_TIMESTEP = 0.00125
 """Of identification, where training takes 10 ms (s). At 2.5 ms centrifugal torques are late by as
 much as small causes do, and a link in a gap stays at its flanks for 5 ms too long."""
+_FAR_MORE = 10.0
+"""Times a limit that nothing reaches then."""
 _PR2_ROUGH = 2.0
 """Steps in one that does for differences."""
 
@@ -60,6 +62,8 @@ class Plant:
     """What is known to lie between a command and the controller."""
     encoders: EncoderSide = "motor"
     """Which side of a joint's gear its logged position is of; servos go by the motor's."""
+    unlimited: tuple[str, ...] = ()
+    """Logged joints whose drives give far more than the model file says."""
     rough_timestep: float | None = None
     """A longer step that does for what a change of the arm changes (s); None if there is none."""
 
@@ -226,27 +230,32 @@ def stepped(plant: Plant, timestep: float) -> Plant:
     return replace(plant, make=make, timestep=timestep, rough_timestep=rough)
 
 
-def stronger(plant: Plant, joints: Sequence[str], times: float) -> Plant:
-    """Return the same arm with drives of some logged joints that may give more.
+def unlimited(plant: Plant, joints: Sequence[str]) -> Plant:
+    """Return the same arm with drives of some logged joints that give far more than its file says.
 
     Args:
         plant: the arm.
         joints: what the log calls them.
-        times: what each of their limits, if the model file has one, is multiplied by.
     """
-    names = {plant.mj_joint(label) for label in joints}
+    found = replace(plant, unlimited=tuple(joints))
 
     def make() -> mujoco.MjSpec:
         spec = plant.make()
-        for actuator in spec.actuators:
-            if actuator.trntype == mujoco.mjtTrn.mjTRN_JOINT and actuator.target in names:
-                actuator.forcerange = times * np.array(actuator.forcerange)
-        for name in names:
-            joint = spec.joint(name)
-            joint.actfrcrange = times * np.array(joint.actfrcrange)
+        lift_limits(spec, found)
         return spec
 
-    return replace(plant, make=make)
+    return replace(found, make=make)
+
+
+def lift_limits(spec: mujoco.MjSpec, plant: Plant) -> None:
+    """Let drives in a model file give far more, at the joints where a plant's do."""
+    names = {plant.mj_joint(label) for label in plant.unlimited}
+    for actuator in spec.actuators:
+        if actuator.trntype == mujoco.mjtTrn.mjTRN_JOINT and actuator.target in names:
+            actuator.forcerange = _FAR_MORE * np.array(actuator.forcerange)
+    for name in names:
+        joint = spec.joint(name)
+        joint.actfrcrange = _FAR_MORE * np.array(joint.actfrcrange)
 
 
 @dataclass(frozen=True)
